@@ -20,8 +20,7 @@ from template_control.checks.checked import checked
 from template_control.embedding.contacts import EARLY, NO_FORCE, SETTLING, SINKING, ContactMonitor
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.motion import LateralMotion
-from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.free.trot import default_options
+from template_control.embedding.free.options import FreeOptions, default_options
 from template_control.embedding.ground import SlopeEstimate, SlopeFrame
 from template_control.embedding.learners.learners import Learners
 from template_control.embedding.modes import PLACED, PathClock, check_legs, modes, set_guards

@@ -16,9 +16,13 @@ from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.course import Course
-from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
-from template_control.embedding.free.soles import SoleOptions
-from template_control.embedding.free.trot import TrotOptions, default_options
+from template_control.embedding.free.options import (
+    FREE_PLANNER,
+    FreeOptions,
+    SoleOptions,
+    TrotOptions,
+    default_options,
+)
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
     BIPED_AHEAD,

@@ -1,4 +1,15 @@
-"""Tuning of the embedding of a floating-base robot, and its table of phases."""
+"""Tuning of the embedding of floating-base robots, and their tables of phases.
+
+On two points nothing holds the trunk about the line between the feet but the momentum of the legs.
+
+On flat feet a sole bears a moment. So in single stance of a walk the CoM's momentum is followed
+too, forward and to the left, and the trunk is kept upright; the centre of pressure moves by
+millimetres for it. A run is that of point feet.
+
+The two legs of a quadruped's template are pairs of legs, and a pair's foot is the mean of its two.
+Two feet that stand hold the trunk about every axis but the line between them, and that line's
+moment comes from how the template's force is shared: the trunk is simply kept level.
+"""
 
 from __future__ import annotations
 
@@ -7,32 +18,57 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from template_control.checks.ranges import NotNegative, Positive, Share
+from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.phases import RUNNING_SWING, PhaseControl, Phases, running_phases
+from template_control.embedding.phases import (
+    RUNNING_SWING,
+    Clock,
+    PhaseControl,
+    Phases,
+    running_phases,
+    standing_phases,
+)
 from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.standing.supports import UNLOADING
 from template_control.embedding.swing import SwingOptions
 from template_control.estimation.filters import NoiseFilterOptions
+from template_control.robot.biped import Biped
+from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.slip.lateral.gait import LateralOptions
 from template_control.slip.similarity import LENGTH, TIME, tuned
+from template_control.whole_body.task import Task
 from template_control.whole_body.tasks import (
     ComTask,
     FootTask,
     OrientationTask,
     SideFootTask,
+    SoleTask,
     SpareJointTask,
     SpinTask,
+    SwayTask,
 )
+
+
+def _walking_phases(single: PhaseControl, double: PhaseControl) -> dict[Phase | str, PhaseControl]:
+    """Entries of walks; a planner with push-off leaves the trim nothing to do."""
+    return {
+        Phase.SS: single,
+        Phase.DS: replace(double, trim_momentum=True),
+        "DS_sc^wp": double,
+        "DS_sd^wp": double,
+    }
+
 
 # Two point feet bear no torque about the line between them: with the height and the trunk held
 # there is one freedom left for x and y, and with the weights of the plane the robot loses speed in
 # every double stance.
-_DOUBLE = PhaseControl(
+_POINT_DOUBLE = PhaseControl(
     tasks=(ComTask((30.0, 30.0)), OrientationTask((4.0, 4.0, 0.4)), SpareJointTask()),
     unload_legs=(Leg.REAR,),
 )
 
-_RUNNING_STANCE = PhaseControl(
+_POINT_RUNNING = PhaseControl(
     # As in the plane, about all three axes.
     tasks=(
         ComTask((0.01, 10.0)),
@@ -45,36 +81,138 @@ _RUNNING_STANCE = PhaseControl(
     swing=RUNNING_SWING,
 )
 
+_POINT_SINGLE = PhaseControl(
+    # As in the plane; and the CoM's y is left to the place of the feet.
+    tasks=(
+        ComTask((0.01, 10.0)),
+        OrientationTask(),
+        FootTask(),
+        SideFootTask(),
+        SpareJointTask(),
+    ),
+    swings=(Leg.FRONT,),
+)
+
 FREE_PHASES: Phases = {
     **running_phases(
         (
             OrientationTask((0.01, 0.01, 0.001)),
-            FootTask(Leg.REAR),
-            SideFootTask(Leg.REAR),
-            FootTask(Leg.FRONT),
-            SideFootTask(Leg.FRONT),
+            *(task(leg) for leg in Leg for task in (FootTask, SideFootTask)),
             SpareJointTask(),
         ),
-        _RUNNING_STANCE,
-        _DOUBLE,
+        _POINT_RUNNING,
+        _POINT_DOUBLE,
     ),
-    Phase.SS: PhaseControl(
-        # As in the plane; and the CoM's y is left to the place of the feet.
-        tasks=(
-            ComTask((0.01, 10.0)),
-            OrientationTask(),
-            FootTask(),
-            SideFootTask(),
-            SpareJointTask(),
-        ),
-        swings=(Leg.FRONT,),
-    ),
-    Phase.DS: replace(_DOUBLE, trim_momentum=True),
-    # A planner with push-off leaves the trim nothing to do.
-    "DS_sc^wp": _DOUBLE,
-    "DS_sd^wp": _DOUBLE,
+    **_walking_phases(_POINT_SINGLE, _POINT_DOUBLE),
 }
-"""Walking and running. Nodes of other gaits find the entry of their phase."""
+"""Walking and running on two points. Nodes of other gaits find the entry of their phase."""
+
+
+# Stiffer than point feet have it: with 10 % more mass the CoM then sinks by 2 mm until the load is
+# learnt, and not by 9 mm, at which the planner leaves its law.
+_SOLE_GAINS = (240.0, 31.0)  # kp [1/s^2], kd [1/s]
+
+_SOLE_SINGLE = PhaseControl(
+    tasks=(
+        # Lighter in x, a sole would be a free lunch: the momentum is drained to move the swing leg.
+        ComTask((1.0, 10.0), _SOLE_GAINS, on_point=True, falling=1.0),
+        SwayTask(1.0),
+        OrientationTask((1.0, 1.0, 0.1)),
+        # Lighter than the rest: a fast swing asks for more than the hips have, and the trunk would
+        # nod with it. But it rises: dragged along the ground it bears the robot.
+        FootTask(weight=(0.1, 1.0)),
+        SideFootTask(weight=0.1),
+        SoleTask(),
+    ),
+    swings=(Leg.FRONT,),
+)
+# Heavy legs fold as little as they may: as those on point feet, they turn the trunk by 0.5 rad.
+_SOLE_SWING = replace(RUNNING_SWING, clearance=0.08, landing_speed=0.4)
+_SOLE_RUNNING = PhaseControl(
+    # As point feet have it. To keep the trunk upright against the legs takes the hips' limits in
+    # half of the stance, and the angular momentum that is left costs a fifth of the speed.
+    tasks=(
+        ComTask((0.01, 10.0), _SOLE_GAINS),
+        # As fast as on point feet, a change of the speed turns the trunk until it falls.
+        SpinTask(bandwidth=35.0),
+        FootTask(),
+        SideFootTask(),
+        SoleTask(),
+    ),
+    swings=(Leg.FRONT,),
+    swing=_SOLE_SWING,
+)
+_SOLE_DOUBLE = PhaseControl(
+    tasks=(
+        ComTask((10.0, 10.0), _SOLE_GAINS, on_point=True),
+        SwayTask(10.0),
+        OrientationTask((4.0, 4.0, 0.4)),
+    ),
+    unload_legs=(Leg.REAR,),
+)
+
+_SOLE_STANDING = replace(_SOLE_DOUBLE, unload_legs=(), clock=Clock.TIME, follow_curve=True)
+_SOLE_STEPPING = replace(_SOLE_SINGLE, clock=Clock.TIME, follow_curve=True)
+
+SOLE_PHASES: Phases = {
+    **running_phases(
+        (
+            OrientationTask((0.2, 0.2, 0.02)),
+            *(task(leg) for leg in Leg for task in (FootTask, SideFootTask, SoleTask)),
+        ),
+        _SOLE_RUNNING,
+        _SOLE_DOUBLE,
+    ),
+    **_walking_phases(_SOLE_SINGLE, _SOLE_DOUBLE),
+    **standing_phases(_SOLE_STANDING, _SOLE_STEPPING, UNLOADING),
+}
+"""Standing, walking, and runs on flat feet. Nodes of other gaits find the entry of their phase."""
+
+
+_LEVEL = OrientationTask((10.0, 10.0, 10.0), yaw_gains=(100.0, 20.0))
+
+
+def _pair(leg: Leg) -> tuple[Task, ...]:
+    """Tasks of both feet of a pair."""
+    return tuple(
+        task(leg, contact=contact) for contact in range(2) for task in (FootTask, SideFootTask)
+    )
+
+
+# Of a pair that has landed, the foot that has not touched yet comes down.
+_PAIR_STANCE = PhaseControl(
+    tasks=(ComTask((0.01, 10.0)), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+    swings=(Leg.FRONT,),
+)
+# The ground's force has no moment about the line between two feet, which is oblique: feedback that
+# moves x alone moves y too. A walk without push-off has no other means to keep its speed.
+_PAIR_SWAYING = replace(_PAIR_STANCE, tasks=(*_PAIR_STANCE.tasks, SwayTask()))
+_PAIR_RUNNING = replace(_PAIR_SWAYING, swing=RUNNING_SWING)
+_PAIR_DOUBLE = PhaseControl(
+    tasks=(ComTask((1.0, 3.0)), SwayTask(), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+    unload_legs=(Leg.REAR,),
+)
+
+# Four feet stand, and hold the CoM's y too.
+_PAIR_STANDING = PhaseControl(
+    tasks=(ComTask((10.0, 10.0)), SwayTask(10.0), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+    clock=Clock.TIME,
+    follow_curve=True,
+)
+_PAIR_STEPPING = replace(_PAIR_STANCE, clock=Clock.TIME, follow_curve=True)
+
+TROT_PHASES: Phases = {
+    **running_phases(
+        (OrientationTask((0.01, 0.01, 0.001)), *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+        _PAIR_RUNNING,
+        _PAIR_DOUBLE,
+    ),
+    **_walking_phases(_PAIR_STANCE, _PAIR_DOUBLE),
+    "SS_av^wp": _PAIR_SWAYING,
+    "SS_bv^wp": _PAIR_SWAYING,
+    **standing_phases(_PAIR_STANDING, _PAIR_STEPPING, UNLOADING),
+}
+"""Standing, walking and running trot. Nodes of other gaits find the entry of their phase."""
 
 
 @dataclass(frozen=True)
@@ -106,6 +244,61 @@ class FreeOptions(EmbeddingOptions):
     step_width: NotNegative = tuned(0.22, LENGTH)
     stop_share: Share = tuned(0.0)
     stop_horizon: Positive = tuned(0.05, TIME)
+
+
+@dataclass(frozen=True)
+class SoleOptions(FreeOptions):
+    """Tuning of the embedding of a robot on flat feet.
+
+    The fields of :class:`FreeOptions` come first.
+
+    Attributes:
+        phases: tasks, clock, feet and learners of each phase.
+        lean: none: the trunk stays upright.
+        lateral: heavy legs run with their feet at half of the walk's distance, just side by side;
+            at all of it they turn the trunk by 0.36 rad to either side, and by 0.7 as they begin.
+    """
+
+    kind: ClassVar[str] = "soles"
+
+    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(SOLE_PHASES))
+    lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
+    lateral: LateralOptions = field(default_factory=lambda: LateralOptions(running_width=0.5))
+
+
+@dataclass(frozen=True)
+class TrotOptions(FreeOptions):
+    """Tuning of the embedding of a quadruped.
+
+    The fields of :class:`FreeOptions` come first.
+
+    Attributes:
+        phases: tasks, clock, feet and learners of each phase.
+        lean: none: the trunk stays level.
+        lateral: pairs of legs may cross, as a push may want them to.
+        step_width: lateral distance between the footholds of both pairs [m]: none, as the middle of
+            either pair is below the trunk's.
+    """
+
+    kind: ClassVar[str] = "trot"
+
+    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(TROT_PHASES))
+    lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
+    lateral: LateralOptions = field(default_factory=lambda: LateralOptions(widths=(-0.6, 0.6)))
+    step_width: NotNegative = tuned(0.0, LENGTH)
+
+
+def default_options(robot: Biped) -> EmbeddingOptions:
+    """Options of a robot's kind.
+
+    Args:
+        robot: planar, or with a floating base and two legs, with point or flat feet, or four.
+    """
+    if robot.patches:
+        return SoleOptions()
+    if len(robot.feet) > LEGS:
+        return TrotOptions()
+    return FreeOptions() if robot.directions > UP else EmbeddingOptions()
 
 
 FREE_PLANNER = LqrOptions(earliest_touchdown=0.1, earliest_share=1.0, trusted_price=0.3)

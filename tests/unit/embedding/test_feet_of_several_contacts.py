@@ -7,8 +7,7 @@ import pytest
 from contact_flags import take_in
 
 from template_control.embedding.contacts import CONTACTS, ContactMonitor, ContactOptions
-from template_control.embedding.free.options import FreeOptions
-from template_control.embedding.free.trot import TrotOptions, default_options
+from template_control.embedding.free.options import FreeOptions, TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.swing import FEET, spread_contacts
 from template_control.robot.library import load_floating_robot, load_robot
