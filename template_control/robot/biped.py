@@ -118,21 +118,8 @@ class Biped(Robot):
         pitch, pitch_rate: of the trunk in the sagittal plane [rad, rad/s].
     """
 
-    path: Path
-    urdf: str
-    feet: tuple[str, ...]
-    groups: tuple[tuple[int, ...], ...]
-    foot_radius: float
-    walk: tuple[float, float] | None
-    patches: tuple[Patch, ...]
-    legs: tuple[tuple[int, ...], ...]
-    hinges: tuple[tuple[int, ...], ...]
-    leg_length: float
     ankle_height = Number("ankle_height")
     toe_ahead = Number("toe_ahead")
-    spread: Array
-    joint_sign: Array
-    leg_mass: float
     trunk_com: float
     com: Array
     com_velocity: Array
@@ -181,7 +168,7 @@ class Biped(Robot):
         straight = straight_legs(model, self._leg_joints, self._foot_ids, flat)
         self.leg_length, self._neutral = straight.reach, straight.q
         check_size(path, self.mass, self.leg_length, foot_radius)
-        self.joint_sign = np.sign(straight.axes[1, self.base_dof :])
+        self.joint_sign: Array = np.sign(straight.axes[1, self.base_dof :])
         self.leg_mass = max(
             float(sum(model.inertias[j].mass for j in leg)) for leg in self._leg_joints
         )
@@ -196,7 +183,7 @@ class Biped(Robot):
         )
         self._take_patches()
         self._look()
-        self.spread = np.zeros((len(feet), 2))
+        self.spread: Array = np.zeros((len(feet), 2))
         self._prepare()
 
     def _take_patches(self) -> None:

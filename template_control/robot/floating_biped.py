@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import acos, cos, isfinite, sin, sqrt
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -28,7 +28,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
-from template_control.robot.terms import FLOATING_DOF, UP, Jacobians, Trunk, gather_floating
+from template_control.robot.terms import FLOATING_DOF, UP, Trunk, gather_floating
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
     check_joint_names,
@@ -68,55 +68,23 @@ class JointLimits(Checked):
 
 
 class SpaceTerms(NamedTuple):
-    """Terms of a robot with three directions, in its heading frame: x forward, y left, z up.
+    """Terms of a robot in all three directions of its heading frame: x forward, y left, z up.
 
     Attributes:
         com, com_velocity, com_bias: (3,) [m, m/s, m/s^2].
-        com_jacobian: (3, nv).
         momentum: (3,) angular, about the CoM [N m s].
-        momentum_jacobian: (3, nv).
         momentum_bias: (3,) [N m].
-        foot: (2, 3) of the template legs' feet, the means of their contacts [m].
-        contact: (n, 3) lowest points of the foot spheres, or toes of the soles [m].
-        contact_jacobian: (n, 3, nv); (n, 6, nv) of soles.
-        contact_bias: (n, 3) [m/s^2]; (n, 6) of soles.
+        foot_position: (2, 3) of the template legs' feet, the means of their contacts [m].
         turning: (3,) angular velocity of the trunk [rad/s].
-        turning_jacobian: (3, nv); its bias is 0.
     """
 
     com: Array
     com_velocity: Array
     com_bias: Array
-    com_jacobian: Array
     momentum: Array
-    momentum_jacobian: Array
     momentum_bias: Array
-    foot: Array
-    contact: Array
-    contact_jacobian: Array
-    contact_bias: Array
+    foot_position: Array
     turning: Array
-    turning_jacobian: Array
-
-    @classmethod
-    def of(cls, data: Any, j: Jacobians) -> SpaceTerms:
-        """Views of a robot's terms, in ``data`` (1,) of ``ROBOT_DATA`` and in its Jacobians."""
-        now = {name: data[name][0] for name in data.dtype.names}
-        return cls(
-            com=now["com"],
-            com_velocity=now["com_velocity"],
-            com_bias=now["com_bias"],
-            com_jacobian=j.com,
-            momentum=now["momentum"],
-            momentum_jacobian=j.momentum,
-            momentum_bias=now["momentum_bias"],
-            foot=now["foot_position"],
-            contact=now["contact_position"][: len(j.contact)],
-            contact_jacobian=j.contact,
-            contact_bias=now["contact_bias"][: len(j.contact), : j.contact.shape[1]],
-            turning=now["turning"],
-            turning_jacobian=j.turning,
-        )
 
 
 class FloatingBaseBiped(Biped):
@@ -139,7 +107,8 @@ class FloatingBaseBiped(Biped):
         heading: angle from the world's x to the heading frame's, to the left positive [rad].
         origin: (2,) x and y of the heading frame's origin in the world [m].
         axes: (3, 3) turns vectors into the heading frame: ``vector @ axes``.
-        space: all terms with three directions, in the heading frame.
+        space: what the sagittal terms leave out, in the heading frame; contacts and ``jacobians``
+            have all three directions anyway.
         spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
             vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
         sway: of flat feet and of pairs, dy/dt of the CoM over dy/dt - L_x / (m z) where the feet
@@ -165,7 +134,7 @@ class FloatingBaseBiped(Biped):
         places, axes = zip(*((hip.translation, hip.rotation) for hip in self._hips), strict=True)
         base = self.heading_frame, tuple(Trunk(self.rotation, places, axes, self._in_leg))
         self._kept = keep((self._sources, self.data, self.arrays[1:], base))
-        self.space = SpaceTerms.of(self.data, self.jacobians)
+        self.space = SpaceTerms(*(self.data[name][0] for name in SpaceTerms._fields))
         self.axes = np.eye(3)
         self.origin = self.heading_frame[:2]
         self.heading = 0.0
@@ -194,7 +163,8 @@ class FloatingBaseBiped(Biped):
             self.update(self._neutral, np.zeros(self.nv))
         for leg, group in enumerate(self.groups):
             contacts = list(group)
-            self.spread[contacts] = (self.space.contact[contacts] - self.space.foot[leg])[:, :2]
+            away = self.contact_position[contacts] - self.space.foot_position[leg]
+            self.spread[contacts] = away[:, :2]
 
     def _sway_ratio(self) -> float:
         """Ratio of dy/dt of the CoM to that with the momentum, dy/dt - L_x / (m z), in a sway.
@@ -204,12 +174,11 @@ class FloatingBaseBiped(Biped):
         """
         q = self.bent()
         self.update(q, np.zeros(self.nv))
-        s = self.space
-        feet = s.contact_jacobian.reshape(-1, self.nv)
-        rows = np.concatenate((s.com_jacobian, s.turning_jacobian, feet))
+        j = self.jacobians
+        rows = np.concatenate((j.com, j.turning, j.contact.reshape(-1, self.nv)))
         v = np.linalg.lstsq(rows, np.eye(len(rows))[1], rcond=None)[0]
-        height = s.com[UP] - s.contact[:, UP].mean()
-        return 1.0 / (1.0 - float(s.momentum_jacobian[0] @ v) / (self.mass * float(height)))
+        height = self.space.com[UP] - self.contact_position[:, UP].mean()
+        return 1.0 / (1.0 - float(j.momentum[0] @ v) / (self.mass * float(height)))
 
     @classmethod
     @checked

@@ -160,13 +160,13 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
         robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose.com[2]
     )
     robot.update(q, np.zeros(robot.nv))
-    rows = _rows(robot)
+    rows, momentum = _rows(robot), robot.jacobians.momentum
     weight = robot.mass * pose.com[2]
     if pose.in_flight:
-        rows[3:6] = robot.space.momentum_jacobian
+        rows[3:6] = momentum
     else:
-        rows[0] += robot.space.momentum_jacobian[1] / weight
-        rows[1] -= robot.space.momentum_jacobian[0] / weight
+        rows[0] += momentum[1] / weight
+        rows[1] -= momentum[0] / weight
         rows[1] *= robot.sway
     wanted, velocities = np.zeros(len(rows)), np.zeros((len(robot.feet), robot.contact_rows))
     wanted[:3] = pose.com_velocity
@@ -299,7 +299,7 @@ def _floating_configuration(
 
     def error(_: Array) -> Array:
         turn = pin.log3(robot.rotation @ upright.T)
-        away = robot.space.contact - feet
+        away = robot.contact_position - feet
         if robot.patches:
             axes = robot.data["contact_axes"][0, : len(feet)]
             away = np.hstack((away, [pin.log3(turned) for turned in axes]))
@@ -327,9 +327,8 @@ def _by_contact(robot: FloatingBaseBiped, pose: FloatingBasePose, values: Array)
 
 def _rows(robot: FloatingBaseBiped) -> Array:
     """(6 + 3 n, nv) Jacobians of the CoM, the trunk's turning and all contacts; 6 rows of soles."""
-    s = robot.space
-    feet = s.contact_jacobian.reshape(-1, robot.nv)
-    return np.concatenate((s.com_jacobian, s.turning_jacobian, feet))
+    j = robot.jacobians
+    return np.concatenate((j.com, j.turning, j.contact.reshape(-1, robot.nv)))
 
 
 def _foot_turning(robot: FloatingBaseBiped, q: Array, foot: int) -> Array:

@@ -304,5 +304,5 @@ def test_the_start_of_a_leg_of_four_hinges_moves_its_feet_as_wanted(load, text):
     )
     q, v = floating_state_in(robot, pose)
     robot.update(q, v)
-    np.testing.assert_allclose(robot.space.foot, pose.feet, atol=1e-9)
+    np.testing.assert_allclose(robot.space.foot_position, pose.feet, atol=1e-9)
     np.testing.assert_allclose(robot.contact_velocity, velocity, atol=1e-9)

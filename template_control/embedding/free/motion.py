@@ -121,11 +121,11 @@ class LateralMotion:
 
     def side(self, foot: int) -> float:
         """y of a foot [m]."""
-        return float(self.robot.space.foot[foot, _SIDE])
+        return float(self.robot.space.foot_position[foot, _SIDE])
 
     def _stands(self, foot: int) -> None:
         """A foot stands where it is now."""
-        self._stood[foot] = self.robot.space.foot[foot, :2]
+        self._stood[foot] = self.robot.space.foot_position[foot, :2]
 
     def end_stride(self, course: Course, com: Array, nominal: bool, section: Section) -> bool:
         """Learn from the stride that has just ended, and turn the heading frame.

@@ -56,5 +56,5 @@ def test_the_yaw_is_that_from_where_the_trunk_is_to_face(go2):
     q = go2.neutral()
     go2.facing = 0.4
     go2.face(-0.3, go2.origin.copy())
-    go2.update(q, 0.0 * go2.space.turning_jacobian[0])
+    go2.update(q, 0.0 * go2.jacobians.turning[0])
     assert go2.roll_pitch_yaw() == pytest.approx((0.0, 0.0, -0.1), abs=1e-12)

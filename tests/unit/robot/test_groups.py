@@ -45,7 +45,7 @@ def test_a_quadruped_s_foot_is_the_mean_of_a_diagonal_pair(go2):
     assert go2.groups == ((0, 3), (1, 2))
     for leg, (one, other) in enumerate(go2.groups):
         mean = 0.5 * (go2.contact_position[one] + go2.contact_position[other])
-        np.testing.assert_allclose(go2.space.foot[leg], mean, atol=1e-15)
+        np.testing.assert_allclose(go2.space.foot_position[leg], mean, atol=1e-15)
         np.testing.assert_allclose(go2.foot_position[leg], mean[[0, 2]], atol=1e-15)
     moving = (
         go2.foot_jacobian
@@ -84,7 +84,7 @@ def test_other_groups_are_given():
     assert robot.groups == ((0, 2), (1, 3))
     moved(robot, 3)
     left = robot.contact_position[[0, 2]].mean(axis=0)
-    np.testing.assert_allclose(robot.space.foot[0], left, atol=1e-15)
+    np.testing.assert_allclose(robot.space.foot_position[0], left, atol=1e-15)
 
 
 @pytest.mark.parametrize(

@@ -49,11 +49,11 @@ def box_mesh(path):
 
 def test_soles_of_spheres(g1):
     """G1 stands on four spheres a foot, whose lowest points are the corners of its sole."""
-    for patch, place in zip(g1.patches, g1.space.contact, strict=True):
+    for patch, place in zip(g1.patches, g1.contact_position, strict=True):
         np.testing.assert_allclose(patch.half_sides, [0.085, 0.03], atol=1e-12)
         # Ahead of the ankle by the CoM's lead over the hips, and on the ground.
         assert g1.toe_ahead == pytest.approx(0.035 - patch.centre[0], abs=1e-9)
-        assert place[2] == pytest.approx(g1.space.contact[0, 2], abs=1e-12)
+        assert place[2] == pytest.approx(g1.contact_position[0, 2], abs=1e-12)
     assert g1.ankle_height == pytest.approx(0.017558 + 0.035, abs=1e-9)
     assert (g1.contact_rows, g1.foot_radius) == (6, 0.0)
     assert [g1.joint_names[j] for j in g1.hinges[0]] == [
@@ -123,11 +123,11 @@ def test_the_sway_ratio_is_that_of_a_sway(g1):
     """Soles and attitude of the trunk rest, and the CoM moves to the left."""
     q = g1.bent()
     g1.update(q, np.zeros(g1.nv))
-    height = g1.space.com[2] - g1.space.contact[0, 2]
-    feet = g1.space.contact_jacobian.reshape(-1, g1.nv)
-    rows = np.vstack((g1.space.turning_jacobian, feet))
+    height = g1.space.com[2] - g1.contact_position[0, 2]
+    feet = g1.contact_jacobian.reshape(-1, g1.nv)
+    rows = np.vstack((g1.jacobians.turning, feet))
     v = np.linalg.svd(rows)[2][len(rows) :].T  # what leaves them at rest
-    v = v @ np.linalg.lstsq(g1.space.com_jacobian @ v, np.array([0.0, 0.1, 0.0]), rcond=None)[0]
+    v = v @ np.linalg.lstsq(g1.jacobians.com @ v, np.array([0.0, 0.1, 0.0]), rcond=None)[0]
     g1.update(q, v)
     assert g1.space.com_velocity[1] == pytest.approx(0.1)
     speed = 0.1 - g1.space.momentum[0] / (g1.mass * height)
@@ -145,7 +145,7 @@ def test_a_start_puts_level_soles_on_the_ground(g1):
     floating_state_in(g1, pose)
     now, s = g1.data[0], g1.space
     np.testing.assert_allclose(s.com, pose.com, atol=1e-9)
-    np.testing.assert_allclose(s.contact, pose.feet, atol=1e-9)
+    np.testing.assert_allclose(g1.contact_position, pose.feet, atol=1e-9)
     np.testing.assert_allclose(now["contact_axes"][:2], [np.eye(3)] * 2, atol=1e-9)
     np.testing.assert_allclose(now["contact_velocity"][1], [0.8, 0.0, 0.1, 0, 0, 0], atol=1e-9)
     sway = s.com_velocity[1] - s.momentum[0] / (g1.mass * pose.com[2])

@@ -162,7 +162,7 @@ def test_orientation_and_side_ask_for_their_way_back(bolt):
     q[3:7] = pin.Quaternion(pin.exp3(np.array([0.02, -0.03, 0.04]))).coeffs()
     bolt.update(q, np.zeros(bolt.nv))
     references = References()
-    references.side[0] = bolt.space.foot[0, 1] + 0.01, 0.0, 0.5
+    references.side[0] = bolt.space.foot_position[0, 1] + 0.01, 0.0, 0.5
     stack = TaskStack((OrientationTask(), SideFootTask(Leg.REAR)), bolt.nv)
     stack.write(bolt, references)
     desired = stack.table[:, bolt.nv + DESIRED]
