@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path
 
@@ -88,8 +88,7 @@ def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
             f"{path}: {hinges} hinges in its legs: a hip and a knee each is what is"
             f" controlled; name these {HINGES * legs} as sagittal_joints"
         )
-    hints = {"effort": "its torque limit", "velocity": "the speed [rad/s] that it can have"}
-    _check_limits(path, model, range(PLANAR_DOF + 1, model.njoints), hints)
+    _check_limits(path, model, range(PLANAR_DOF + 1, model.njoints))
 
 
 def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
@@ -151,9 +150,7 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool
         )
     if flat:
         _check_flat(path, model, feet, legs)
-        joints = [joint for leg in legs for joint in leg]
-        hints = {"effort": "its limit", "velocity": "its limit"}
-        _check_limits(path, model, joints, hints)
+        _check_limits(path, model, [joint for leg in legs for joint in leg])
         return
     most = _MOST if len(legs) == LEGS else _LEAST
     for leg, foot in zip(legs, feet, strict=True):
@@ -177,8 +174,7 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool
         raise RobotError(
             f"{path}: joints {others} are in no leg: make them fixed, or name them in `locked`"
         )
-    hints = {"effort": "its limit", "velocity": "its limit"}
-    _check_limits(path, model, joints, hints)
+    _check_limits(path, model, joints)
 
 
 def _check_flat(
@@ -235,14 +231,11 @@ def feet_of_legs(
     return tuple(map(int, first)), tuple(map(int, other))
 
 
-def _check_limits(
-    path: Path, model: pin.Model, joints: Iterable[int], hints: Mapping[str, str]
-) -> None:
-    """Check that joints have limits of torque and speed; ``hints``: what to give of each kind.
+_LIMITS = {"effort": "its torque limit", "velocity": "the speed [rad/s] that it can have"}
 
-    Their stops are checked to be in radians.
-    """
-    joints = list(joints)
+
+def _check_limits(path: Path, model: pin.Model, joints: Sequence[int]) -> None:
+    """Check that joints have limits of torque and speed, and stops in radians."""
     for joint in joints:
         place = model.idx_qs[joint]
         stops = float(model.lowerPositionLimit[place]), float(model.upperPositionLimit[place])
@@ -257,7 +250,7 @@ def _check_limits(
             limit = limits[model.idx_vs[joint]]
             if not 0.0 < limit < UNLIMITED:
                 raise RobotError(
-                    f"{path}: joint {model.names[joint]!r} has {kind} {limit}: give {hints[kind]}"
+                    f"{path}: joint {model.names[joint]!r} has {kind} {limit}: give {_LIMITS[kind]}"
                 )
 
 

@@ -213,17 +213,15 @@ def _tell_rotors(path: Path, robot: ET.Element) -> None:
         for element in part.iter():
             local = element.tag.rpartition("}")[2]
             if local in _ROTORS or any(name in element.attrib for name in _ROTORS):
-                _log_rotor(path, str(part.get("name")))
+                text = "%s: the rotor inertia of %r is ignored, as all others: PyBullet has none"
+                warn_once(text, path, str(part.get("name")))
                 return
 
 
 @cache
-def _log_rotor(path: Path, name: str) -> None:
-    _LOG.warning(
-        "%s: the rotor inertia of %r is ignored, as all others: PyBullet has none",
-        path,
-        name,
-    )
+def warn_once(text: str, *values: object) -> None:
+    """Log a warning, once for each text with its values."""
+    _LOG.warning(text, *values)
 
 
 def _line(error: Exception) -> str:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import xml.etree.ElementTree as ET
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -23,12 +21,12 @@ from template_control.robot.urdf import (
     check_shapes,
     end_of,
     strip_motion,
+    warn_once,
     why_impossible,
 )
 
 Array = NDArray[np.float64]
 
-_LOG = logging.getLogger(__name__)
 _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begins with
 
 
@@ -68,15 +66,20 @@ def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
     return {str(joint.get("name")) for joint in robot.findall("joint")} - held
 
 
+def _carriers(robot: ET.Element, link: str) -> list[ET.Element]:
+    """The joints that carry a link, from its own to the root's."""
+    above = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
+    found = []
+    while link in above:
+        found.append(above.pop(link))
+        link = end_of(found[-1], "parent")
+    return found
+
+
 def joints_in_no_leg(robot: ET.Element, feet: Collection[str]) -> set[str]:
     """Names of the joints that move no foot."""
-    carriers = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
-    found = {str(joint.get("name")) for joint in carriers.values()}
-    for link in feet:
-        while link in carriers:
-            found.discard(str(carriers[link].get("name")))
-            link = end_of(carriers[link], "parent")
-    return found
+    legs = {str(joint.get("name")) for foot in feet for joint in _carriers(robot, foot)}
+    return {str(joint.get("name")) for joint in robot.findall("joint")} - legs
 
 
 def lock(
@@ -140,14 +143,8 @@ def set_ranges(
     path: Path, robot: ET.Element, feet: Sequence[str], ranges: Sequence[tuple[float, float]]
 ) -> None:
     """Give the joints of both legs other ranges [rad], from the trunk to the knee."""
-    carriers = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
     for foot in feet:
-        leg, link = [], foot
-        while link in carriers:
-            joint = carriers.pop(link)
-            link = end_of(joint, "parent")
-            if joint.get("type") != "fixed":
-                leg.append(joint)
+        leg = [joint for joint in _carriers(robot, foot) if joint.get("type") != "fixed"]
         if len(leg) != len(ranges):
             raise RobotError(
                 f"{path}: {len(leg)} joints move foot {foot!r}, and {len(ranges)} ranges are given:"
@@ -216,7 +213,12 @@ def find_meshes(path: Path, robot: ET.Element) -> None:
                         " put it there, or give the link a box, cylinder or sphere"
                     )
     if missing:
-        _log_meshes(path, len(missing), missing[0])
+        warn_once(
+            "%s: %d meshes are missing, the first is %s: the robot walks, and is shown with sticks",
+            path,
+            len(missing),
+            missing[0],
+        )
 
 
 def _file(path: Path, name: str) -> Path | None:
@@ -241,16 +243,6 @@ def _package_folders(inside: str) -> list[str]:
     return [str(Path(r).parent) if Path(r).name == package else r for r in roots]
 
 
-@cache
-def _log_meshes(path: Path, count: int, name: str) -> None:
-    _LOG.warning(
-        "%s: %d meshes are missing, the first is %s: the robot walks, and is shown with sticks",
-        path,
-        count,
-        name,
-    )
-
-
 def take_points(path: Path, robot: ET.Element) -> None:
     """Take links on the trunk whose inertia is no body's for points with their mass; and log it.
 
@@ -272,17 +264,10 @@ def take_points(path: Path, robot: ET.Element) -> None:
                 inertia.attrib.update(dict.fromkeys(MOMENTS, "0"))
                 points.append(child)
     if points:
-        _log_points(path, tuple(points))
-
-
-@cache
-def _log_points(path: Path, links: tuple[str, ...]) -> None:
-    _LOG.warning(
-        "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points",
-        path,
-        len(links),
-        ", ".join(links),
-    )
+        text = (
+            "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points"
+        )
+        warn_once(text, path, len(points), ", ".join(points))
 
 
 def write_out_massless(robot: ET.Element) -> None:

@@ -199,7 +199,7 @@ MISTAKES = {
     "is JointModel… and must be revolute with limits": edited(
         HIP, HIP.replace("revolute", "continuous")
     ),
-    "has effort … give its limit": edited('effort="350"', 'effort="0"'),
+    "has effort … give its torque limit": edited('effort="350"', 'effort="0"'),
     "has lower … and upper … give a range that it can turn in": edited(
         'lower="0" upper="2.5"', 'lower="2.5" upper="0"'
     ),
