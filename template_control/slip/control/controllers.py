@@ -199,7 +199,6 @@ class Controller:
         """
         design, (n, m) = self.design, self._map.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
-        self._begin(aim, guess)
         self._check(aim)
         aim = np.append(aim, self._compression)
         table = self._table.copy()
@@ -224,9 +223,6 @@ class Controller:
                 break
         assert near is not None
         return near
-
-    def _begin(self, target: Array, guess: Array | None) -> None:
-        """Take what a search needs of its target and its guess."""
 
     def _descend(self, stride: StrideEnd, aim: Array, table: Array, start: Array) -> StepSolution:
         """The best controls that are found from some; ``aim`` has the compression too."""
@@ -296,8 +292,6 @@ class ActiveWalking(Controller):
 class ModifiedWalking(Controller):
     """VLO to VLO with the angle; kappa_1 is given and kappa_2 follows from energy, (38).
 
-    One control seldom reaches all of a target.
-
     Args:
         parameters: the template.
         kind: of return map.
@@ -327,14 +321,19 @@ class ModifiedWalking(Controller):
         self._range = k0 * np.array(stiffness_range)
         self._margin = top_margin
 
-    def _begin(self, target: Array, guess: Array | None) -> None:
-        self._energy = Aim(target, self._range)
+    def solve(
+        self,
+        z: Sequence[float] | Array,
+        target: Sequence[float] | Array,
+        guess: Array | None = None,
+    ) -> StepSolution:
+        """See :meth:`Controller.solve`; one control seldom reaches all of the target."""
+        self._energy = Aim(finite("target", target, 3), self._range)
+        return super().solve(z, target, guess)
 
 
 class WalkToRun(Controller):
     """VLO to apex with the front leg's stiffnesses before and after its bottom: (39) to (41).
-
-    Touchdown angle, k_sc and k_sd of a guess, which are the walking controller's, are kept.
 
     Args:
         parameters: the template.
@@ -357,9 +356,23 @@ class WalkToRun(Controller):
         stride = self.design.stride + ("*" if simplified else "")
         self._search_on(ReturnMap(parameters, stride, kind), weights)
 
-    def _begin(self, target: Array, guess: Array | None) -> None:
+    def solve(
+        self,
+        z: Sequence[float] | Array,
+        target: Sequence[float] | Array,
+        guess: Array | None = None,
+    ) -> StepSolution:
+        """See :meth:`Controller.solve`.
+
+        Args:
+            z: (3,) VLO state.
+            target: (2,) apex state.
+            guess: (NUM_SLOTS,) its touchdown angle, k_sc and k_sd, which are the walking
+                controller's, are kept.
+        """
         if guess is not None:
             self._grid[:, :3] = guess[:3]
+        return super().solve(z, target, guess)
 
 
 class RunToWalk(Controller):
