@@ -434,10 +434,10 @@ class EmbeddingController:
 
     def _decide(self, section: Section) -> None:
         s, learners, lateral = self.observer.now, self.learners, self.lateral
-        supervisor, reached = self.supervisor, None
+        supervisor, reached, course = self.supervisor, None, self.course(self.time)
         if supervisor.deciding:
             nominal, ended = supervisor.decision.nominal, section.of(s.state)
-            if self._turn(section, nominal):
+            if self._turn(section, course, nominal):
                 self.robot.update(*self.frame.enter(*self.frame.raw_state))
                 self._read()
                 if section is REST:
@@ -448,27 +448,22 @@ class EmbeddingController:
         self._enter(supervisor.decide(*now, reached).name)
         learners.begin_stride(supervisor, self.mode.trimmed)
         if lateral is not None:
-            course, state = self.course(self.time), self.lateral_state()
-            stride = section, supervisor, course, self.node, s, state, self.time
+            stride = section, supervisor, course, self.node, s, self.lateral_state(), self.time
             self._enter(lateral.begin_stride(*stride).name)
         taken = Course() if lateral is None else lateral.taken
         self.courses.append(taken._replace(facing=self.robot.facing))
         self.path_clock.restart()
 
-    def _turn(self, section: Section, nominal: bool) -> bool:
+    def _turn(self, section: Section, course: Course, nominal: bool) -> bool:
         """Turn the axes to where the robot is to go; whether it has to be read again.
 
         The step that closes the feet after a walk goes on where the walk went.
         """
-        rests = section is REST
-        if self.lateral is None and not rests:
-            return False
-        course = self.course(self.time)
-        if rests and self.supervisor.goal.closes:
+        if section is REST and self.supervisor.goal.closes:
             course = course._replace(facing=nan)
         if self.lateral is not None:
             return self.lateral.end_stride(course, self.lateral_state(), nominal, section)
-        turns = course.turns_round(self.robot)
+        turns = section is REST and course.turns_round(self.robot)
         if turns:
             self.frame.turn_round()
             self.observer.pre_impact_velocity[0] *= -1.0

@@ -116,8 +116,7 @@ class RoutePlanners:
 
         That is the same stride again; after one from gait to gait, the stride that follows it.
         """
-        begins = self.automaton.sections(self.automaton.starts[goal.stride])[0]
-        if section_of(begins) is section or goal.then is None:
+        if self._sections(goal.stride)[0] is section or goal.then is None:
             return goal
         return replace(goal, stride=goal.then, then=None)
 
@@ -136,9 +135,14 @@ class RoutePlanners:
                 f"{name_of(method)} asks for a stride {goal.stride!r}: give one of"
                 f" {', '.join(self.automaton.starts)}"
             )
-        end = section_of(self.automaton.sections(self.automaton.starts[goal.stride])[1])
-        check(f"{name_of(method)}: the target", goal.target, _TARGETS[end.dimension])
+        size = self._sections(goal.stride)[1].dimension
+        check(f"{name_of(method)}: the target", goal.target, _TARGETS[size])
         return goal
+
+    def _sections(self, stride: str) -> tuple[Section, Section]:
+        """Sections at which a kind of stride begins and ends."""
+        begin, end = self.automaton.sections(self.automaton.starts[stride])
+        return section_of(begin), section_of(end)
 
     def of(self, goal: StrideGoal) -> Planner:
         """The planner of a goal's stride; a ParameterError if there is none."""
@@ -200,16 +204,14 @@ class RoutePlanners:
         """
         if goal.then is None or goal.then == goal.stride or goal.then not in self.planners:
             return None
-        begin, end = self.automaton.sections(self.automaton.starts[goal.stride])
-        after = self.automaton.sections(self.automaton.starts[goal.then])
-        if begin is not end or after[0] is not begin or after[1] is not end:
+        begin, end = self._sections(goal.stride)
+        if begin is not end or self._sections(goal.then) != (begin, end):
             return None
         return replace(goal, stride=goal.then, then=None)
 
     def padded_target(self, goal: StrideGoal) -> Array:
         """(3,) dx/dt, y, dy/dt where a goal leads to."""
-        end = section_of(self.automaton.sections(self.automaton.starts[goal.stride])[1])
-        return end.padded(goal.target)
+        return self._sections(goal.stride)[1].padded(goal.target)
 
     def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
         """A decision at ``z`` (n,), and the section state from which its path starts.

@@ -343,15 +343,6 @@ class FloatingBaseBiped(Biped):
         """Mean height of the hips that swing the legs forward [m], at the last update."""
         return float(self.data["hips"][0, UP])
 
-    def roll_pitch_yaw(self) -> tuple[float, float, float]:
-        """Attitude of the trunk in the heading frame, at the last update [rad].
-
-        Roll and pitch are the angles of its upward axis from the vertical, about the heading
-        frame's x and y; yaw is that of its forward axis about the vertical.
-        """
-        roll, pitch, yaw = self.data[0]["attitude"].tolist()
-        return roll, pitch, yaw
-
     def yaw_inertia(self) -> float:
         """Moment of inertia about the vertical through the CoM, at the last update [kg m^2]."""
         return float(self._data.Ig.inertia[2, 2])

@@ -221,9 +221,8 @@ class OrientationTask(CompiledTask):
         w' = kp (roll_ref - roll, pitch_ref - pitch, yaw_ref - yaw) - kd w
 
     Roll and pitch are how far the trunk's upward axis leans, about the heading frame's axes; yaw is
-    the direction of its forward axis (:meth:`.FloatingBaseBiped.roll_pitch_yaw`). In the trunk's
-    own axes its angular acceleration is a part of the generalised acceleration, so
-    there is no bias.
+    the direction of its forward axis (``attitude`` of ``ROBOT_DATA``). In the trunk's own axes its
+    angular acceleration is a part of the generalised acceleration, so there is no bias.
 
     Attributes:
         weight: of roll, pitch and yaw [s^4/rad^2]. A point foot bears no torque about the vertical:

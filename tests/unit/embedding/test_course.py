@@ -57,4 +57,4 @@ def test_the_yaw_is_that_from_where_the_trunk_is_to_face(go2):
     go2.facing = 0.4
     go2.face(-0.3, go2.origin.copy())
     go2.update(q, 0.0 * go2.jacobians.turning[0])
-    assert go2.roll_pitch_yaw() == pytest.approx((0.0, 0.0, -0.1), abs=1e-12)
+    assert tuple(go2.data["attitude"][0]) == pytest.approx((0.0, 0.0, -0.1), abs=1e-12)
