@@ -26,7 +26,7 @@ from template_control.embedding.planners.planner import (
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.control.least_squares import Search
-from template_control.slip.control.stride_solver import Prior, solve_stride, whole
+from template_control.slip.control.stride_solver import Prior, StrideEnd, solve_stride, whole
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import Scale, scaled, tuned
@@ -135,24 +135,19 @@ class TransitionPlanner(Planner):
         if target is not None and target[0] != self.gait.state[0]:
             self.gait = self._after(float(target[0]))
         wanted = self.gait.state if target is None else target
-        size = self._map.dimensions[1]
-        prior = self._prior(z, angles)
-        u, end = solve_stride(whole(self._map, z), wanted, prior, self._weights[:size, :size])
-        return self._decision(u, end, wanted)
+        return self._solved(whole(self._map, z), wanted, self._prior(z, angles))
 
     def decide_rest(self, context: RestContext) -> Decision:
         """See :meth:`~.planner.Planner.decide_rest`."""
         if context.cause is Cause.RECOVERY:
             return self._break_into(context)
-        ahead, target, controls = context.ahead, context.target, context.decision.controls
+        controls = context.decision.controls
         stiff = [slot for slot in context.free if slot != Slot.TOUCHDOWN_ANGLE]
         base = controls[stiff]
         lower, upper = (share * base for share in _AGAIN_BOUNDS)
         table = np.array([base, _AGAIN * base, lower, upper])
         prior = Prior(controls, stiff, table, _SEARCH)
-        size = len(target)
-        u, end = solve_stride(ahead, target, prior, self._weights[:size, :size])
-        return self._decision(u, end, target)
+        return self._solved(context.ahead, context.target, prior)
 
     def _break_into(self, context: RestContext) -> Decision:
         """From another stride. u_0 is the next gait's; what is not free here stays."""
@@ -174,11 +169,11 @@ class TransitionPlanner(Planner):
         u = controls.copy()
         u[own] = gait.controls[[chosen[slot] for slot in own]]
         prior = Prior(u, slots, np.array([base, change, lower, upper]), _SEARCH)
-        size = len(target)
-        u, end = solve_stride(context.ahead, target, prior, self._weights[:size, :size])
-        return self._decision(u, end, target)
+        return self._solved(context.ahead, target, prior)
 
-    def _decision(self, u: Array, end: Array | None, wanted: Array) -> Decision:
+    def _solved(self, stride: StrideEnd, wanted: Array, prior: Prior) -> Decision:
+        size = len(wanted)
+        u, end = solve_stride(stride, wanted, prior, self._weights[:size, :size])
         predicted = self._map.sections[1].padded(wanted if end is None else end)
         return Decision(u, predicted, end is not None, end is not None, False)
 
