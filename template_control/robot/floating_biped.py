@@ -90,18 +90,8 @@ class SpaceTerms(NamedTuple):
 class FloatingBaseBiped(Biped):
     """Model of a floating-base biped, and its kinematics and dynamics at the last :meth:`update`.
 
-    :meth:`from_urdf` makes one from a file. Its attributes are those of
-    :class:`~template_control.robot.biped.Biped`, and those below.
-
-    Args:
-        path: the URDF file.
-        urdf: its text.
-        model: Pinocchio's of it.
-        feet: names of the foot frames.
-        foot_radius: of the foot spheres [m].
-        walk: the robot's own gait, or None.
-        groups: the contacts of each template leg.
-        patches: of flat feet, the soles.
+    :meth:`from_urdf` makes one from a file. Its arguments and attributes are those of
+    :class:`~template_control.robot.biped.Biped`, and the attributes below.
 
     Attributes:
         heading: angle from the world's x to the heading frame's, to the left positive [rad].

@@ -38,16 +38,8 @@ _PITCH = 2  # place of the trunk's pitch in q
 class PlanarBiped(Biped):
     """Model of a planar biped and its kinematics and dynamics at the last :meth:`update`.
 
-    :meth:`from_urdf` makes one from a file. Its attributes are those of
-    :class:`~.biped.Biped`, and those below.
-
-    Args:
-        path: the URDF file.
-        urdf: its text.
-        model: Pinocchio's of it.
-        feet: names of the two foot frames, left then right.
-        foot_radius: of the foot spheres [m].
-        walk: the robot's own gait, or None.
+    :meth:`from_urdf` makes one from a file. Its arguments and attributes are those of
+    :class:`~.biped.Biped`, and the attributes below.
 
     Attributes:
         trunk_axes: (3, 3) rotation from the frame of the upright trunk to the world.

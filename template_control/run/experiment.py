@@ -18,10 +18,9 @@ from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.options import (
     FREE_PLANNER,
-    FreeOptions,
-    SoleOptions,
-    TrotOptions,
+    AnyOptions,
     default_options,
+    options_of_kind,
 )
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
@@ -127,7 +126,7 @@ class Experiment(Checked):
     robot: RobotSpec | Biped | str = field(default_factory=RobotSpec)
     motion: GaitSpec | Scenario | VelocityProfile | VelocityCommand | Gait | Route | None = None
     planner: PlannerSpec | Planner | Planners | None = None
-    controller: EmbeddingOptions | FreeOptions | TrotOptions | SoleOptions | None = None
+    controller: AnyOptions | None = None
     world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(
         default_factory=default_plant
     )
@@ -184,14 +183,11 @@ class Experiment(Checked):
 
     def _kind(self) -> EmbeddingOptions:
         """Options of the robot's kind."""
-        if not isinstance(self.robot, RobotSpec):
-            assert isinstance(self.robot, Biped)
-            return default_options(self.robot)
-        if self.robot.trots:
-            return TrotOptions()
-        if self.free and self.robot.stands_flat:
-            return SoleOptions()
-        return FreeOptions() if self.free else EmbeddingOptions()
+        robot = self.robot
+        if isinstance(robot, RobotSpec):
+            return options_of_kind(free=robot.free, flat=robot.stands_flat, trots=robot.trots)
+        assert isinstance(robot, Biped)
+        return default_options(robot)
 
     @property
     def delay_ticks(self) -> int:

@@ -169,7 +169,16 @@ SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""
 
 
-_NO_AIM = LateralAim(np.zeros(2), 0.0, np.zeros((2, 2)), 0.0, np.zeros(2), np.zeros(2), 0.0, 1.0)
+_NO_AIM = LateralAim(
+    state=np.zeros(2),
+    step=0.0,
+    cost=np.zeros((2, 2)),
+    step_cost=0.0,
+    offset=np.zeros(2),
+    steps=np.zeros(2),
+    reach=0.0,
+    stretch=1.0,
+)
 """Of a robot that has walked towards no gait yet: its path comes to no foothold."""
 
 

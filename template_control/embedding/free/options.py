@@ -288,17 +288,23 @@ class TrotOptions(FreeOptions):
     step_width: NotNegative = tuned(0.0, LENGTH)
 
 
-def default_options(robot: Biped) -> EmbeddingOptions:
-    """Options of a robot's kind.
+AnyOptions = EmbeddingOptions | FreeOptions | TrotOptions | SoleOptions
+"""Options of a kind of robot."""
 
-    Args:
-        robot: planar, or with a floating base and two legs, with point or flat feet, or four.
-    """
-    if robot.patches:
-        return SoleOptions()
-    if len(robot.feet) > LEGS:
+
+def options_of_kind(*, free: bool, flat: bool, trots: bool) -> AnyOptions:
+    """Options of a kind of robot: with a floating base, on flat feet, with four legs."""
+    if trots:
         return TrotOptions()
-    return FreeOptions() if robot.directions > UP else EmbeddingOptions()
+    if free and flat:
+        return SoleOptions()
+    return FreeOptions() if free else EmbeddingOptions()
+
+
+def default_options(robot: Biped) -> AnyOptions:
+    """Options of a robot's kind."""
+    free, trots = robot.directions > UP, len(robot.feet) > LEGS
+    return options_of_kind(free=free, flat=bool(robot.patches), trots=trots)
 
 
 FREE_PLANNER = LqrOptions(earliest_touchdown=0.1, earliest_share=1.0, trusted_price=0.3)
