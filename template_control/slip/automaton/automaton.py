@@ -58,96 +58,166 @@ FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
 """Of a flight: it ends at the ground."""
 
 
-def _flight(name: str, way: Edge) -> Node:
-    return Node(name, Phase.F, None, None, (way, *FLIGHT_FAILURES))
-
-
-def _single(name: str, leg: Slot, *edges: Edge) -> Node:
-    return Node(name, Phase.SS, leg, None, edges)
-
-
-def _double(name: str, rear: Slot, front: Slot, *ways: Edge) -> Node:
-    return Node(name, Phase.DS, rear, front, (*ways, *DOUBLE_STANCE_FAILURES))
-
-
-def _curve(name: str, way: Edge) -> Node:
-    return Node(name, Phase.DS, None, None, (way, *CURVE_FAILURES))
-
-
-def _stepping(gait: str, entered: str) -> Node:
-    """From VLO to the touchdown that enters a node."""
-    touchdown = Edge(Event.TOUCHDOWN, entered, Reset.PLACE_FRONT, f"G_t^{gait}")
-    return _single(f"SS_av^{gait}", Slot.K_SC, touchdown, *AWAITING_TOUCHDOWN_FAILURES)
-
-
-def _landing(gait: str) -> tuple[Node, Node]:
-    """From an apex over the touchdown to the bottom."""
-    touchdown = Edge(Event.TOUCHDOWN, f"SS_sc^{gait}", Reset.PLACE_REAR, f"G_t^{gait}")
-    bottom = Edge(Event.BOTTOM, f"SS_sd^{gait}", Reset.NONE, f"G_b^{gait}")
-    return (
-        _flight(f"F_aa^{gait}", touchdown),
-        _single(f"SS_sc^{gait}", Slot.K_SC, bottom, *RUNNING_STANCE_FAILURES),
-    )
-
-
 def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
     """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO.
 
     ``rear`` are slots of the rear leg's stiffness in double stance, before and after the bottom.
     """
-    bottom = Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}")
-    liftoff = Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}")
-    vlo = Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True)
     return (
-        _stepping(gait, f"DS_sc^{gait}"),
-        # The paper assumes a virtual bottom in every double stance; a short one of a disturbed
-        # walker ends without.
-        _double(f"DS_sc^{gait}", rear[0], Slot.K_SC, bottom, liftoff),
-        _double(f"DS_sd^{gait}", rear[1], Slot.K_SD, liftoff),
-        _single(f"SS_bv^{gait}", Slot.K_SD, vlo, *SINGLE_STANCE_FAILURES),
+        Node(
+            f"SS_av^{gait}",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, f"DS_sc^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            f"DS_sc^{gait}",
+            Phase.DS,
+            rear[0],
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
+                # The paper assumes a virtual bottom in every double stance; a short one of a
+                # disturbed walker ends without.
+                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            f"DS_sd^{gait}",
+            Phase.DS,
+            rear[1],
+            Slot.K_SD,
+            (
+                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            f"SS_bv^{gait}",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True),
+                *SINGLE_STANCE_FAILURES,
+            ),
+        ),
     )
 
 
 def running() -> tuple[Node, ...]:
     """Apex -> touchdown -> bottom -> liftoff -> apex."""
-    liftoff = Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r")
     return (
-        *_landing("r"),
-        _single("SS_sd^r", Slot.K_SD, liftoff, *RUNNING_STANCE_FAILURES),
-        _flight("F_ba^r", Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True)),
+        Node(
+            "F_aa^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r"), *FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^r",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"), *RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^r",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r"),
+                *RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "F_ba^r",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *FLIGHT_FAILURES),
+        ),
     )
 
 
 def walk_to_run() -> tuple[Node, ...]:
     """The WRT stride: the rear leg walks, the front leg runs (Section IV-C1)."""
-    bottom = Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr")
-    rear_liftoff = Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr")
     return (
-        _single(
+        Node(
             "SS_av^wr",
+            Phase.SS,
             Slot.K_SC,
-            Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
-            # A walker that is too fast takes off before.
-            Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
-            *AWAITING_TOUCHDOWN_FAILURES[1:],
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
+                # A walker that is too fast takes off before.
+                Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
+                *AWAITING_TOUCHDOWN_FAILURES[1:],
+            ),
         ),
-        _flight("F_aa^wr", Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr")),
-        _double("DS_sc^wr", Slot.K_SC, Slot.K_SC, bottom, rear_liftoff),
-        _double("DS_sd^wr", Slot.K_SD, Slot.K_SC_WR, rear_liftoff),
-        _single(
-            "SS_sc^wr",
+        Node(
+            "F_aa^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr"), *FLIGHT_FAILURES),
+        ),
+        Node(
+            "DS_sc^wr",
+            Phase.DS,
+            Slot.K_SC,
+            Slot.K_SC,
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_sd^wr",
+            Phase.DS,
+            Slot.K_SD,
             Slot.K_SC_WR,
-            Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
-            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-            *RUNNING_STANCE_FAILURES,
+            (
+                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+                *DOUBLE_STANCE_FAILURES,
+            ),
         ),
-        _single(
+        Node(
+            "SS_sc^wr",
+            Phase.SS,
+            Slot.K_SC_WR,
+            None,
+            (
+                Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *RUNNING_STANCE_FAILURES,
+            ),
+        ),
+        Node(
             "SS_sd^wr",
+            Phase.SS,
             Slot.K_SD_WR,
-            Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
-            *RUNNING_STANCE_FAILURES,
+            None,
+            (
+                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
+                *RUNNING_STANCE_FAILURES,
+            ),
         ),
-        _flight("F_ba^wr", Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True)),
+        Node(
+            "F_ba^wr",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *FLIGHT_FAILURES),
+        ),
     )
 
 
@@ -158,18 +228,26 @@ def simplified_walk_to_run() -> tuple[Node, ...]:
     phase; from there on the stride is the real one.
     """
     return (
-        _single(
+        Node(
             "SS_av^wr*",
+            Phase.SS,
             Slot.K_SC,
-            Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
-            *AWAITING_TOUCHDOWN_FAILURES,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
         ),
-        _double(
+        Node(
             "DS_sc^wr*",
+            Phase.DS,
             Slot.K_SC,
             Slot.K_SC,
-            Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
-            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+            (
+                Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                *DOUBLE_STANCE_FAILURES,
+            ),
         ),
         Node(
             "SS_br^wr*",
@@ -188,8 +266,32 @@ def simplified_walk_to_run() -> tuple[Node, ...]:
 
 def run_to_walk() -> tuple[Node, ...]:
     """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
-    vlo = Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True)
-    return (*_landing("rw"), _single("SS_sd^rw", Slot.K_SD, vlo, *SINGLE_STANCE_FAILURES))
+    return (
+        Node(
+            "F_aa^rw",
+            Phase.F,
+            None,
+            None,
+            (Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw"), *FLIGHT_FAILURES),
+        ),
+        Node(
+            "SS_sc^rw",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"), *RUNNING_STANCE_FAILURES),
+        ),
+        Node(
+            "SS_sd^rw",
+            Phase.SS,
+            Slot.K_SD,
+            None,
+            (
+                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
+                *SINGLE_STANCE_FAILURES,
+            ),
+        ),
+    )
 
 
 def standing() -> tuple[Node, ...]:
@@ -199,38 +301,85 @@ def standing() -> tuple[Node, ...]:
     own simulator falls through them.
     """
     return (
-        _curve("DS_ar^s", Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True)),
-        _curve("DS_ar^sw", Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw")),
-        _stepping("ws", "DS_br^ws"),
-        _curve("DS_br^ws", Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True)),
-        _stepping("ww", "DS_bl^ww"),
-        _curve("DS_bl^ww", Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww")),
+        Node(
+            "DS_ar^s",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True), *CURVE_FAILURES),
+        ),
+        Node(
+            "DS_ar^sw",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw"), *CURVE_FAILURES),
+        ),
+        Node(
+            "SS_av^ws",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_br^ws", Reset.PLACE_FRONT, "G_t^ws"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_br^ws",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True), *CURVE_FAILURES),
+        ),
+        Node(
+            "SS_av^ww",
+            Phase.SS,
+            Slot.K_SC,
+            None,
+            (
+                Edge(Event.TOUCHDOWN, "DS_bl^ww", Reset.PLACE_FRONT, "G_t^ww"),
+                *AWAITING_TOUCHDOWN_FAILURES,
+            ),
+        ),
+        Node(
+            "DS_bl^ww",
+            Phase.DS,
+            None,
+            None,
+            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww"), *CURVE_FAILURES),
+        ),
     )
 
 
-def _step_from_a_stand(gait: str, lifts: Edge, rests: Edge) -> tuple[Node, ...]:
+def _stepping(gait: str, lifts: Edge, rests: Edge) -> tuple[Node, ...]:
     """From a stand, over one leg, to a stand; ``lifts`` and ``rests`` begin and end it."""
     return (
-        _curve(f"DS_al^{gait}", lifts),
-        _single(
+        Node(f"DS_al^{gait}", Phase.DS, None, None, (lifts, *CURVE_FAILURES)),
+        Node(
             f"SS_bt^{gait}",
+            Phase.SS,
             Slot.K_SC,
-            Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
-            *AWAITING_TOUCHDOWN_FAILURES[:2],
+            None,
+            (
+                Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+                Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
+            ),
         ),
-        _curve(f"DS_br^{gait}", rests),
+        Node(f"DS_br^{gait}", Phase.DS, None, None, (rests, *CURVE_FAILURES)),
     )
 
 
 def steps_from_a_stand() -> tuple[Node, ...]:
     """A step forward, and one back, whose foot lands behind the other: then they change roles."""
     return (
-        *_step_from_a_stand(
+        *_stepping(
             StrideKind.STEP_FORWARD,
             Edge(Event.REAR_LIFTOFF, "SS_bt^sf", Reset.SHIFT, "G_l^sf"),
             Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^sf", section=True),
         ),
-        *_step_from_a_stand(
+        *_stepping(
             StrideKind.STEP_BACK,
             Edge(Event.FRONT_LIFTOFF, "SS_bt^sb", Reset.NONE, "G_l^sb"),
             Edge(Event.REST, "DS_ar^s", Reset.SWAP, "G_r^sb", section=True),
