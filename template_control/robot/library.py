@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib.metadata
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -21,32 +22,22 @@ _FILES = (".urdf", ".xacro")
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
-@dataclass(frozen=True)
-class _Entry:
+class _Entry(NamedTuple):
     """A robot's URDF and how it is loaded.
 
     Attributes:
         file: name of the URDF.
         about: one line.
         distribution: the Python package that brings the URDF; "" for ours.
-        feet, sagittal_joints, foot_radius, walk: see :meth:`PlanarBiped.from_urdf`.
-        planar: whether it is held in its sagittal plane, unless it is to have a floating base.
-        free: whether it has a model with a floating base.
-        limits: of a robot with a floating base, in place of the URDF's; None to keep those.
-        flat: whether it has flat feet.
+        planar: arguments of :meth:`PlanarBiped.from_urdf`; None: it has no planar model.
+        floating: those of :meth:`FloatingBaseBiped.from_urdf`; None: its base cannot float.
     """
 
     file: str
     about: str
     distribution: str = ""
-    feet: tuple[str, ...] = ("left_foot", "right_foot")
-    sagittal_joints: tuple[str, ...] = ()
-    foot_radius: float | None = None
-    walk: tuple[float, float] | None = None
-    planar: bool = True
-    free: bool = False
-    limits: JointLimits | None = None
-    flat: bool = False
+    planar: Mapping[str, Any] | None = None
+    floating: Mapping[str, Any] | None = None
 
 
 # Bolt's actuator, the module of the Open Dynamic Robot Initiative (Grimminger et al., "An open
@@ -63,93 +54,102 @@ _BOLT_ACTUATOR = JointLimits(
 # bend behind only, as Go2's. Ahead, its running trot became faster from step to step.
 _SOLO_ACTUATOR = replace(_BOLT_ACTUATOR, ranges=((-0.9, 0.9), (-1.45, 1.45), (-2.8, 0.0)))
 
-_CORNERS = ("FL", "FR", "RL", "RR")  # as Unitree names the legs of a quadruped
-
+_OTHERS = "example-robot-data"
+_HINGES = ("left_hip", "left_knee", "right_hip", "right_knee")
 _ENTRIES = {
-    "five-link": _Entry("five_link.urdf", "light legs, as robots built for the SLIP have them"),
-    "runner": _Entry("runner.urdf", "five-link of 65 kg with actuators for 5 m/s"),
+    "five-link": _Entry(
+        "five_link.urdf", "light legs, as robots built for the SLIP have them", planar={}
+    ),
+    "runner": _Entry("runner.urdf", "five-link of 65 kg with actuators for 5 m/s", planar={}),
     "human": _Entry(
-        "human.urdf", "Winter's fractions of 80 kg and 1.80 m", walk=(np.radians(66.0), 0.303)
+        "human.urdf",
+        "Winter's fractions of 80 kg and 1.80 m",
+        planar={"walk": (np.radians(66.0), 0.303)},
     ),
     "rabbit": _Entry(
         "rabbit.urdf",
         "RABBIT of Grenoble, five links, 62 % of its mass in the legs",
-        walk=(np.radians(68.0), 0.271),
+        planar={"walk": (np.radians(68.0), 0.271)},
     ),
     "bolt": _Entry(
         "bolt.urdf",
         "the point-foot biped of example-robot-data, held in its sagittal plane",
-        distribution="example-robot-data",
-        feet=("FL_FOOT", "FR_FOOT"),
-        sagittal_joints=("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE"),
-        foot_radius=0.016,
-        free=True,
-        limits=_BOLT_ACTUATOR,
+        _OTHERS,
+        planar={
+            "feet": ("FL_FOOT", "FR_FOOT"),
+            "sagittal_joints": ("FL_HFE", "FL_KFE", "FR_HFE", "FR_KFE"),
+            "foot_radius": 0.016,
+        },
+        floating={
+            "feet": ("FL_FOOT", "FR_FOOT"),
+            "foot_radius": 0.016,
+            "limits": _BOLT_ACTUATOR,
+        },
     ),
     "five-link-3d": _Entry(
         "five_link_3d.urdf",
         "five-link with hip ab- and adduction",
-        sagittal_joints=("left_hip", "left_knee", "right_hip", "right_knee"),
-        free=True,
+        planar={"sagittal_joints": _HINGES},
+        floating={},
     ),
     "runner-3d": _Entry(
         "runner_3d.urdf",
         "runner with hip ab- and adduction",
-        sagittal_joints=("left_hip", "left_knee", "right_hip", "right_knee"),
-        free=True,
+        planar={"sagittal_joints": _HINGES},
+        floating={},
     ),
     "go2": _Entry(
         "go2.urdf",
         "Unitree's quadruped of example-robot-data, which trots",
-        distribution="example-robot-data",
-        feet=tuple(f"{corner}_foot" for corner in _CORNERS),
-        foot_radius=0.022,
-        planar=False,
-        free=True,
+        _OTHERS,
+        floating={
+            "feet": ("FL_foot", "FR_foot", "RL_foot", "RR_foot"),
+            "foot_radius": 0.022,
+        },
     ),
     "solo12": _Entry(
         "solo12.urdf",
         "the Open Dynamic Robot Initiative's quadruped of example-robot-data, which trots",
-        distribution="example-robot-data",
-        feet=("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"),
-        foot_radius=0.016,
-        planar=False,
-        free=True,
-        limits=_SOLO_ACTUATOR,
+        _OTHERS,
+        floating={
+            "feet": ("FL_FOOT", "FR_FOOT", "HL_FOOT", "HR_FOOT"),
+            "foot_radius": 0.016,
+            "limits": _SOLO_ACTUATOR,
+        },
     ),
     "g1": _Entry(
         "g1_29dof_rev_1_0.urdf",
         "Unitree's humanoid of example-robot-data, on flat feet, arms and waist held",
-        distribution="example-robot-data",
-        feet=("left_ankle_roll_link", "right_ankle_roll_link"),
-        planar=False,
-        free=True,
-        flat=True,
+        _OTHERS,
+        floating={
+            "feet": ("left_ankle_roll_link", "right_ankle_roll_link"),
+            "flat_feet": True,
+        },
     ),
     "talos": _Entry(
         "talos_reduced.urdf",
         "PAL Robotics' humanoid of example-robot-data, on flat feet, arms and waist held",
-        distribution="example-robot-data",
-        feet=("leg_left_6_link", "leg_right_6_link"),
-        planar=False,
-        free=True,
-        flat=True,
+        _OTHERS,
+        floating={"feet": ("leg_left_6_link", "leg_right_6_link"), "flat_feet": True},
     ),
 }
+_FLOATING = {name: e.floating for name, e in _ENTRIES.items() if e.floating is not None}
 
 SHIPPED: dict[str, str] = {name: entry.about for name, entry in _ENTRIES.items()}
 """Names of all robots, with a line about each."""
 
-ROBOTS: dict[str, str] = {name: SHIPPED[name] for name, e in _ENTRIES.items() if e.planar}
+ROBOTS: dict[str, str] = {
+    name: SHIPPED[name] for name, e in _ENTRIES.items() if e.planar is not None
+}
 """Names that :func:`load_robot` knows, with a line about each."""
 
-FLOATING_ROBOTS = tuple(name for name, entry in _ENTRIES.items() if entry.free)
+FLOATING_ROBOTS = tuple(_FLOATING)
 """Names that :func:`load_floating_robot` knows."""
 
-FLAT_FEET = tuple(name for name, entry in _ENTRIES.items() if entry.flat)
+FLAT_FEET = tuple(name for name, given in _FLOATING.items() if "flat_feet" in given)
 """Those of them that stand on soles."""
 
-QUADRUPEDS = tuple(name for name, entry in _ENTRIES.items() if len(entry.feet) > LEGS)
+QUADRUPEDS = tuple(n for n, given in _FLOATING.items() if len(given.get("feet", ())) > LEGS)
 """Those of them that have four legs."""
 
 
@@ -195,20 +195,27 @@ def _files(entry: _Entry) -> list[Path]:
     return [Path(str(f.locate())) for f in files if f.name == entry.file]
 
 
-def _name(name: str | Path) -> str:
-    """A robot's name or path as text; a RobotError if it is the text of a URDF."""
+def _load(name: str | Path, kind: type[AnyBiped]) -> AnyBiped:
+    """A shipped robot by the name that users know it by, or any by the path of its URDF."""
     text = str(name)
     if text.lstrip("\ufeff \n").startswith("<"):
         raise RobotError(
             "a robot's name or the path of its URDF is wanted, not the URDF's text: write it to a"
             " file, and give the file's path"
         )
-    return text
-
-
-def _named(name: str, robot: AnyBiped) -> AnyBiped:
-    """The robot, by the name that users know it by and not its URDF's."""
-    robot.model.name = robot.name = name
+    if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
+        return kind.from_urdf(text)
+    path, entry = robot_path(text), _ENTRIES[text]
+    given = entry.planar if kind is PlanarBiped else entry.floating
+    if given is None and kind is PlanarBiped:
+        raise RobotError(f"robot {text!r} has no planar model: load it with load_floating_robot")
+    if given is None:
+        raise RobotError(
+            f"robot {text!r} has no model with a floating base: give one of"
+            f" {list(FLOATING_ROBOTS)} or a URDF file"
+        )
+    robot = kind.from_urdf(path, **given)
+    robot.model.name = robot.name = text  # not its URDF's
     return robot
 
 
@@ -219,22 +226,7 @@ def load_robot(name: str | Path) -> PlanarBiped:
     Raises:
         RobotError: if there is no such robot or file, or it is no planar biped.
     """
-    text = _name(name)
-    if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
-        return PlanarBiped.from_urdf(text)
-    path, entry = robot_path(text), _ENTRIES[text]
-    if not entry.planar:
-        raise RobotError(f"robot {text!r} has no planar model: load it with load_floating_robot")
-    return _named(
-        text,
-        PlanarBiped.from_urdf(
-            path,
-            entry.feet,
-            entry.sagittal_joints,
-            foot_radius=entry.foot_radius,
-            walk=entry.walk,
-        ),
-    )
+    return _load(name, PlanarBiped)
 
 
 @checked
@@ -244,23 +236,4 @@ def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
     Raises:
         RobotError: if there is no such robot or file, or it is planar.
     """
-    text = _name(name)
-    if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
-        return FloatingBaseBiped.from_urdf(text)
-    path, entry = robot_path(text), _ENTRIES[text]
-    if not entry.free:
-        raise RobotError(
-            f"robot {text!r} has no model with a floating base: give one of"
-            f" {list(FLOATING_ROBOTS)} or a URDF file"
-        )
-    return _named(
-        text,
-        FloatingBaseBiped.from_urdf(
-            path,
-            entry.feet,
-            entry.foot_radius,
-            limits=entry.limits,
-            walk=entry.walk,
-            flat_feet=entry.flat,
-        ),
-    )
+    return _load(name, FloatingBaseBiped)

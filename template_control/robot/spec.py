@@ -21,6 +21,16 @@ from template_control.robot.library import (
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import LEGS
 
+_OF_A_URDF = [
+    "feet",
+    "sagittal_joints",
+    "foot_radius",
+    "foot_offset",
+    "locked",
+    "lossless",
+    "flat_feet",
+]
+
 
 @dataclass(frozen=True)
 class RobotSpec(Checked):
@@ -83,21 +93,8 @@ class RobotSpec(Checked):
         return robot.changed(self.gravity, self.masses)
 
     def _load(self) -> Biped:
-        """The robot as its URDF has it.
-
-        Raises:
-            RobotError: if there is none, or it is no such biped.
-            ParameterError: if a shipped robot comes with what only a URDF needs.
-        """
-        own = {
-            "feet": self.feet,
-            "sagittal_joints": self.sagittal_joints,
-            "foot_radius": self.foot_radius,
-            "foot_offset": self.foot_offset,
-            "locked": self.locked,
-            "lossless": self.lossless,
-            "flat_feet": self.flat_feet,
-        }
+        """The robot as its URDF has it; see :meth:`load`."""
+        own = {name: getattr(self, name) for name in _OF_A_URDF}
         given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
         if not given:
             return load_floating_robot(self.model) if self.free else load_robot(self.model)
@@ -107,7 +104,7 @@ class RobotSpec(Checked):
         if self.free:
             if self.sagittal_joints:
                 raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
-            return FloatingBaseBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+            return FloatingBaseBiped.from_urdf(self.model, **given)
         if self.stands_flat:
             raise ParameterError("a robot in its plane has point feet: run one on flat feet free")
-        return PlanarBiped.from_urdf(self.model, **given)  # type: ignore[arg-type]
+        return PlanarBiped.from_urdf(self.model, **given)
