@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -386,19 +386,12 @@ def chained(first: Stride, second: Stride) -> Stride:
     """Two parts of one stride; the second starts where the first ended, at an event within it."""
     meta = second.meta.copy()
     meta[:, 0] += first.duration
-    events = (
-        FiredEvent(first.duration + e.time, e.event, e.source, e.target, e.state, e.reset)
-        for e in second.events
-    )
-    return Stride(
-        outcome=second.outcome,
-        node=second.node,
-        state=second.state,
-        toes=second.toes,
+    events = (event._replace(time=first.duration + event.time) for event in second.events)
+    return replace(
+        second,
         duration=first.duration + second.duration,
         events=(*first.events, *events),
         cx=np.concatenate((first.cx, second.cx)),
         cy=np.concatenate((first.cy, second.cy)),
         meta=np.concatenate((first.meta, meta)),
-        node_names=first.node_names,
     )

@@ -389,7 +389,8 @@ class EmbeddingController:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
         supervisor = self.supervisor
         goal = supervisor.goal if supervisor.deciding else supervisor.first_goal()
-        self.feet.lift(foot, self.robot, self.mode.swing or self.swings.towards(goal), swung)
+        shape = self.mode.control.swing or self.swings.towards(goal)
+        self.feet.lift(foot, self.robot, shape, swung)
         if self.lateral is not None:
             self.lateral.lift(foot)
 

@@ -26,7 +26,6 @@ from template_control.embedding.com_path import at_direction, at_time, leg_force
 from template_control.embedding.phases import Clock, PhaseControl, Phases, phase_control
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.supervisor import StrideSupervisor
-from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -194,8 +193,8 @@ class Mode:
     """Mode of the robot: a node of the automaton with all that the controller looks up for it.
 
     ``outgoing_edges`` lead to other nodes, in order. ``stance`` are legs that carry, ``swings``
-    legs in the air that have a foothold to go to, ``swing`` is the shape of their swings (None: the
-    robot's). ``trimmed``: the momentum trim acts somewhere in the stride. ``data`` is of ``MODE``.
+    legs in the air that have a foothold to go to. ``trimmed``: the momentum trim acts somewhere in
+    the stride. ``data`` is of ``MODE``.
     """
 
     node: Node
@@ -204,7 +203,6 @@ class Mode:
     outgoing_edges: tuple[Edge, ...]
     stance: tuple[int, ...]
     swings: tuple[int, ...]
-    swing: SwingOptions | None
     trimmed: bool
     data: Any
 
@@ -238,7 +236,6 @@ def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool
         # Plain numbers: an enumeration's members are slow to index with.
         stance=tuple(int(leg) for leg in node.stance),
         swings=tuple(int(leg) for leg in control.swings),
-        swing=control.swing,
         trimmed=trimmed,
         data=data,
     )
