@@ -131,10 +131,10 @@ class SlopeFrame:
     """Turns states into axes that lean with the ground, and results back into the world's.
 
     The robot's gravity is turned as well; a free robot stays in the world's axes. ``angle`` is the
-    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``. The
-    axes' x points where a planar robot goes. Of its state only the sagittal terms are turned round
-    for that, by its model (``facing``), whose coordinates stay those of a trunk that faces uphill
-    or downhill as it does. ``raw_state`` is q and v in the world, as they entered last.
+    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``. The axes' x points where a
+    planar robot goes. Of its state only the sagittal terms are turned round for that, by its model
+    (``facing``), whose coordinates stay those of a trunk that faces uphill or downhill as it does.
+    ``raw_state`` is q and v in the world, as they entered last.
     """
 
     raw_state: tuple[Array, Array]
@@ -142,8 +142,8 @@ class SlopeFrame:
     def __init__(self, robot: Biped, data: Any) -> None:
         self._robot, self.data = robot, data
         self._planar = robot if isinstance(robot, PlanarBiped) else None
-        self._turn: Array = self.data["turn"][0]
-        self._shift: Array = self.data["shift"][0]
+        self._turn: Array = data["turn"][0]
+        self._shift: Array = data["shift"][0]
         self.reset()
 
     def reset(self) -> None:
