@@ -160,8 +160,10 @@ class RunningPlanner(Planner):
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
         goal, at_target = self._aim(z, wanted)
-        table = self.bounds(z, near, angles)
-        prior = Prior(near.controls, _SLOTS, table, Search(self.options.rounds))
+        o, length, legs = self.options, near.parameters.rest_length, near.controls[: len(_SLOTS)]
+        reach = float(angles[0]), float(angles[1])
+        table = leg_bounds(z, legs, reach, length, o.change, o.stiffness_range)
+        prior = Prior(near.controls, _SLOTS, table, Search(o.rounds))
         stride = whole(self._map, z)
 
         def solve(goal: Array) -> tuple[Array, Array | None]:
@@ -172,20 +174,6 @@ class RunningPlanner(Planner):
         predicted = self.offset.copy()
         predicted[:2] += z if end is None else end
         return Decision(u, predicted, completed, completed, completed and at_target)
-
-    def bounds(self, z: Array, gait: RunningGait, angles: tuple[float, float]) -> Array:
-        """(4, 3) of a :class:`~.stride_solver.Prior`: controls about a gait's.
-
-        Args:
-            z: (2,) apex that the stride begins at [m/s, m].
-            gait: near the present speed.
-            angles: least and greatest alpha that the swing foot can still reach [rad].
-        """
-        o, l0 = self.options, gait.parameters.rest_length
-        legs = gait.controls[: len(_SLOTS)]
-        low, high = float(angles[0]), float(angles[1])
-        table: Array = leg_bounds(z, legs, (low, high), l0, o.change, o.stiffness_range)
-        return table
 
     def _aim(self, z: Array, wanted: Array) -> tuple[Array, bool]:
         """(2,) the template's next apex, less the offset; whether it is what was wanted."""
