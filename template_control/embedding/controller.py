@@ -35,7 +35,7 @@ from template_control.embedding.state import (
     StateObserver,
 )
 from template_control.embedding.supervisor import StrideSupervisor
-from template_control.embedding.swing import Feet
+from template_control.embedding.swing import Feet, Swings
 from template_control.embedding.tick import (
     DIVERGED,
     QUIET,
@@ -139,7 +139,7 @@ class EmbeddingController:
         self.slope = SlopeEstimate(self.parameters.rest_length)
         self.frame = SlopeFrame(robot, tick["frame"])
         self.references = References(pitch=o.trunk_pitch)
-        self.swings = o.swings(robot, scale)
+        self.swings = Swings.of(robot, scale, o.swing)
         self.feet = Feet(self.references.foot, tick["feet"])
         com = self.references.com
         self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"], robot.half_length)

@@ -13,12 +13,11 @@ from template_control.embedding.learners.lean import LeanOptions
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.phases import PHASES, PhaseControl, Phases
 from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.swing import SwingOptions, Swings
+from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError, meant
 from template_control.estimation.delay import DelayOptions
-from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Phase
-from template_control.slip.similarity import Scale, tuned
+from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions
 from template_control.whole_body.task import Task, task_name
 
@@ -99,17 +98,6 @@ class EmbeddingOptions(QpOptions):
                     f" {', '.join(known)}, or PHASE.TASK"
                 )
         return table
-
-    def swings(self, robot: Biped, scale: Scale) -> Swings:
-        """Shapes of a robot's swings in phases that have none of their own.
-
-        Args:
-            robot: the model.
-            scale: units of its template, to which these options are scaled.
-        """
-        if self.swing is not None:
-            return Swings(self.swing, self.swing)
-        return Swings.of(robot, scale)
 
 
 def _with_numbers(task: Task, numbers: Mapping[str, Any], where: str) -> Task:

@@ -261,13 +261,16 @@ class Swings(NamedTuple):
     other: SwingOptions
 
     @classmethod
-    def of(cls, robot: Biped, scale: Scale) -> Swings:
+    def of(cls, robot: Biped, scale: Scale, shape: SwingOptions | None = None) -> Swings:
         """The shapes for a robot: the high one in steady strides if its legs are light enough.
 
         Args:
             robot: the model.
             scale: units of its template.
+            shape: of all swings, scaled to it; None: the library chooses.
         """
+        if shape is not None:
+            return cls(shape, shape)
         low, light = SwingOptions(), robot.leg_mass <= _HEAVIEST * robot.mass
         steady, other = (scaled(shape, scale) for shape in (HIGH_SWING if light else low, low))
         return cls(steady, other)

@@ -7,7 +7,7 @@ import pytest
 from robot_guards import RobotGuards
 
 import template_control as tc
-from template_control.embedding import HIGH_SWING, GuardOptions, SwingOptions
+from template_control.embedding import HIGH_SWING, GuardOptions, SwingOptions, Swings
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.replanning import (
     END_TOLERANCE,
@@ -91,12 +91,12 @@ def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(gait):
 @pytest.mark.parametrize(("name", "high"), [("five-link", True), ("rabbit", False)])
 def test_light_legs_lift_their_feet_high_in_steady_walking(name, high):
     robot = tc.load_robot(name)
-    swings = tc.EmbeddingOptions().swings(robot, SCALE)
+    swings = Swings.of(robot, SCALE)
     walk = StrideGoal("w", np.zeros(3), 1.1)
     assert (swings.towards(walk) == HIGH_SWING) is high
     assert swings.towards(replace(walk, then="wr")) == SwingOptions(), "a run comes"
     own = SwingOptions(clearance=0.07)
-    assert tc.EmbeddingOptions(swing=own).swings(robot, SCALE).towards(walk) == own
+    assert Swings.of(robot, SCALE, own).towards(walk) == own
 
 
 @pytest.mark.slow(seconds=20)
