@@ -259,25 +259,17 @@ class FloatingBaseBiped(Biped):
         x, y, z, w = q[3:7].tolist()
         square = x * x + y * y + z * z + w * w
         if abs(square - 1.0) > _UNIT:  # NaN and infinity are reported below
-            q = self._with_unit(q, sqrt(square))
+            length = sqrt(square)
+            if isfinite(length) and abs(length - 1.0) > _ROUNDED:
+                raise ParameterError(
+                    f"{self.name}: the quaternion q[3:7] = {q[3:7].tolist()} has length"
+                    f" {length:.6g}: give x, y, z, w of length 1"
+                )
+            q = q.copy()
+            q[3:7] /= length
         drift = self._compute(q, v)
         if not gather_floating(self._kept, q, v, drift):
             raise self._diverged(q, v)
-
-    def _with_unit(self, q: Array, length: float) -> Array:
-        """A configuration whose quaternion is as long as 1.
-
-        Raises:
-            ParameterError: if it was longer or shorter by more than rounding.
-        """
-        if isfinite(length) and abs(length - 1.0) > _ROUNDED:
-            raise ParameterError(
-                f"{self.name}: the quaternion q[3:7] = {q[3:7].tolist()} has length {length:.6g}:"
-                " give x, y, z, w of length 1"
-            )
-        q = q.copy()
-        q[3:7] /= length
-        return q
 
     def face(self, heading: float, origin: Array) -> None:
         """Put the heading frame somewhere; takes effect at the next :meth:`update`.

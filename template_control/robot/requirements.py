@@ -20,6 +20,7 @@ from template_control.robot.legs import (
     straight_legs,
 )
 from template_control.robot.terms import FLOATING_DOF, LEGS, PLANAR_DOF
+from template_control.robot.urdf import collision_shapes
 
 Array = NDArray[np.float64]
 
@@ -263,21 +264,12 @@ def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> fl
 
     A RobotError names the foot that has not one sphere, or the radii that differ.
     """
-    try:
-        geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
-    except (ValueError, RuntimeError) as error:
-        raise RobotError(
-            f"{path}: a collision mesh cannot be read ({str(error).strip().splitlines()[0]}): give"
-            " another, or a box, cylinder or sphere"
-        ) from None
+    mend = "another, or a box, cylinder or sphere"
+    shapes = collision_shapes(path, urdf, model, mend).geometryObjects
     radii = set()
     for foot in feet:
         frame = foot_frame(model, foot)
-        spheres = [
-            g
-            for g in geometry.geometryObjects
-            if g.parentFrame == frame and hasattr(g.geometry, "radius")
-        ]
+        spheres = [g for g in shapes if g.parentFrame == frame and hasattr(g.geometry, "radius")]
         if len(spheres) != 1:
             raise RobotError(f"{path}: foot link {foot!r} must have one sphere as collision shape")
         add_foot_frame(model, foot, spheres[0].placement)

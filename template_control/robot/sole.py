@@ -23,6 +23,7 @@ from template_control.robot.legs import (
     leg_joints,
     straight_legs,
 )
+from template_control.robot.urdf import collision_shapes
 from template_control.robot.urdf_edits import vector_text
 
 Array = NDArray[np.float64]
@@ -74,7 +75,7 @@ def find_soles(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> 
     """
     data, found = model.createData(), []
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    shapes = _geometry(path, urdf, model).geometryObjects
+    shapes = collision_shapes(path, urdf, model, "`sole`, or another shape").geometryObjects
     for foot in feet:
         frame = foot_frame(model, foot)
         points = [
@@ -107,16 +108,6 @@ def find_soles(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> 
 def mirrored(sole: Sole) -> list[Sole]:
     """The soles of the left and the right foot."""
     return [sole, Sole(sole.centre * (1.0, -1.0, 1.0), sole.half_sides)]
-
-
-def _geometry(path: Path, urdf: str, model: pin.Model) -> pin.GeometryModel:
-    try:
-        return pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
-    except (ValueError, RuntimeError) as error:
-        raise RobotError(
-            f"{path}: a collision mesh cannot be read ({str(error).strip().splitlines()[0]}): give"
-            " `sole`, or another shape"
-        ) from None
 
 
 def _points(body: object) -> list[tuple[Array, float]]:

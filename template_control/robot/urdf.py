@@ -80,6 +80,16 @@ def build_model(path: Path, urdf: str) -> pin.Model:
         raise RobotError(f"{path} is no URDF that Pinocchio reads ({_line(error)})") from None
 
 
+def collision_shapes(path: Path, urdf: str, model: pin.Model, mend: str) -> pin.GeometryModel:
+    """Collision shapes of a URDF's text; a RobotError with a ``mend`` if a mesh cannot be read."""
+    try:
+        return pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
+    except (ValueError, RuntimeError) as error:
+        raise RobotError(
+            f"{path}: a collision mesh cannot be read ({_line(error)}): give {mend}"
+        ) from None
+
+
 def end_of(joint: ET.Element, end: str) -> str:
     """Name of the link at an end of a joint, ``parent`` or ``child``; "" where none is named."""
     element = joint.find(end)
