@@ -221,14 +221,6 @@ def at_direction(
     return t, sample(coefficients, meta, look, t, out)
 
 
-@compiled
-def at_time(
-    coefficients: Array, meta: Array, look: Array, x: float, y: float, guess: float, out: Array
-) -> tuple[float, int]:
-    """As :func:`at_direction`, but the time is ``guess`` itself, wherever the robot is."""
-    return guess, sample(coefficients, meta, look, guess, out)
-
-
 # Largest normal force of a foot that is about to lift off, over the template's. It is over 1, as
 # the robot's forces are not exactly the template's.
 _UNLOADED = 1.3

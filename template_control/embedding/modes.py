@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Range
 from template_control.compiled import compiled, unfused
-from template_control.embedding.com_path import at_direction, at_time, leg_forces
+from template_control.embedding.com_path import at_direction, leg_forces, sample
 from template_control.embedding.phases import Clock, PhaseControl, Phases, phase_control
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.supervisor import StrideSupervisor
@@ -329,7 +329,7 @@ def move_clock(
     if mode.by_direction:
         path.time, row = at_direction(coefficients, meta, look, x, y, guess, want.com)
     else:
-        path.time, row = at_time(coefficients, meta, look, x, y, guess, want.com)
+        path.time, row = guess, sample(coefficients, meta, look, guess, want.com)
     path.offset += (s.state[2] - speed) * dt
     toe, forces = look[0], path.forces
     leg_forces(meta[row], toe, want.com, path.body, forces)

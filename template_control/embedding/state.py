@@ -94,16 +94,6 @@ def read_toes(s: Any, f: Any, r: Any, mode: Any) -> None:
     s.toes[0] += s.rear_shift
 
 
-@compiled
-def predict_velocity(s: Any, acceleration: Array, dt: float) -> None:
-    """Predict the velocity that the next tick, ``dt`` [s] on, has if nothing hits the robot.
-
-    ``s``, of ``SENSED``, is overwritten; ``acceleration`` (2,) is wanted of the CoM [m/s^2].
-    """
-    for axis in range(2):
-        s.pre_impact_velocity[axis] = s.state[2 + axis] + acceleration[axis] * dt
-
-
 @dataclass
 class TemplateState:
     """State of the robot in the template's terms; overwritten at every tick.

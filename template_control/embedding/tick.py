@@ -34,7 +34,7 @@ from template_control.embedding.modes import (
     move_clock,
     plan_is_due,
 )
-from template_control.embedding.state import SENSED, predict_velocity, read_state, rolled
+from template_control.embedding.state import SENSED, read_state, rolled
 from template_control.embedding.swing import (
     FEET,
     drop,
@@ -239,7 +239,8 @@ def advance(kept: Any, dt: float) -> None:
     write_rows(program, data, arrays, references, table)
     if mode.estimate_load:
         observe_load(t.load, want.lift, dt)
-    predict_velocity(s, want.com[4:], dt)
+    for axis in range(2):  # of the next tick, if nothing hits the robot
+        s.pre_impact_velocity[axis] = s.state[2 + axis] + want.com[4 + axis] * dt
     t.time += dt
 
 

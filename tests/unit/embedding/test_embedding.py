@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from robot_guards import RobotGuards
 
-from template_control.embedding.com_path import at_direction, at_time, join, leg_forces, sample
+from template_control.embedding.com_path import at_direction, join, leg_forces, sample
 from template_control.embedding.learners.momentum import LOAD, LoadEstimate, observe_load
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.state import TemplateState
@@ -85,9 +85,6 @@ def test_phase_look_up_inverts_the_path(brisk_gait, time, scale):
     t, _ = at_direction(*curve, scale * state[0], scale * state[1], 0.2, found)
     assert t == pytest.approx(time, abs=1e-8)
     np.testing.assert_allclose(found, state, atol=1e-7)
-    # By time, wherever the robot is.
-    assert at_time(*curve, -5.0, 0.1, time, found)[0] == time
-    np.testing.assert_allclose(found, state, atol=1e-12)
 
 
 def test_template_forces_accelerate_the_template(gait):
