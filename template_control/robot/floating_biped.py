@@ -28,7 +28,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
-from template_control.robot.terms import FLOATING_DOF, UP, Trunk, gather_floating
+from template_control.robot.terms import FLOATING_DOF, UP, gather_floating
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
     check_joint_names,
@@ -122,7 +122,7 @@ class FloatingBaseBiped(Biped):
         self._hips = [data.oMi[hip] for hip, *_ in self._hinges]
         self._in_leg = np.zeros((len(self._hips), 3))
         places, axes = zip(*((hip.translation, hip.rotation) for hip in self._hips), strict=True)
-        base = self.heading_frame, tuple(Trunk(self.rotation, places, axes, self._in_leg))
+        base = self.heading_frame, (self.rotation, places, axes, self._in_leg)
         self._kept = keep((self._sources, self.data, self.arrays[1:], base))
         self.space = SpaceTerms(*(self.data[name][0] for name in SpaceTerms._fields))
         self.axes = np.eye(3)

@@ -31,14 +31,12 @@ class StraightLegs:
 
     Attributes:
         q: (nq,) configuration; the angle of a hinge is the one next to the middle of its range.
-        length: from the hip's axis over the knee's to the foot, of the shortest leg [m].
         reach: from the hip's axis to the foot, with a knee as straight as its range lets it be, of
             the leg that reaches least [m].
         axes: (3, nv) directions of the joints' axes in the world, in ``q``.
     """
 
     q: Array
-    length: float
     reach: float
     axes: Array
 
@@ -70,14 +68,13 @@ def straight_legs(
         _turn_lateral(model, data, q, leg)
     axes = np.array(pin.computeJointJacobians(model, data, q)[3:])
     pin.updateFramePlacements(model, data)
-    lengths, reaches = [], []
+    reaches = []
     for leg, foot in zip(legs, feet, strict=True):
         hip, knee, *ankle = leg_hinges(model, leg, flat)
         thigh = data.oMi[knee].translation - data.oMi[hip].translation
         end = data.oMi[ankle[0]] if ankle else data.oMf[foot]
         shank = end.translation - data.oMi[knee].translation
         upper, lower = hypot(thigh[0], thigh[2]), hypot(shank[0], shank[2])
-        lengths.append(upper + lower)
         lean = atan2(-thigh[0], -thigh[2])
         bend = atan2(-shank[0], -shank[2]) - lean
         for joint, angle in ((hip, lean), (knee, bend)):
@@ -89,10 +86,8 @@ def straight_legs(
         low, high = model.lowerPositionLimit[place], model.upperPositionLimit[place]
         bend = float(max(low - q[place], q[place] - high, 0.0))  # the knee's, at the least
         folded = sqrt(upper**2 + lower**2 + 2.0 * upper * lower * cos(bend))
-        reaches.append(folded if bend > 0.0 else lengths[-1])
-    return StraightLegs(
-        q, min(lengths), min(reaches), np.array(pin.computeJointJacobians(model, data, q)[3:])
-    )
+        reaches.append(folded if bend > 0.0 else upper + lower)
+    return StraightLegs(q, min(reaches), np.array(pin.computeJointJacobians(model, data, q)[3:]))
 
 
 def middle(model: pin.Model, joint: int) -> float:

@@ -259,30 +259,16 @@ def _gather_feet(s: Any) -> None:
             s.foot_position[leg, k], s.foot_velocity[leg, k] = place / members, speed / members
 
 
-class Trunk(NamedTuple):
-    """Views into Pinocchio's data of a floating base and its hips, and where they are.
-
-    Attributes:
-        rotation: (3, 3) of the trunk, to the world.
-        places: of each hip's joint, (3,) in the world [m].
-        axes: (3, 3) of each of these joints.
-        points: (n, 3) of each hip's axis, from its joint, in the joint's axes: in the plane in
-            which the leg swings [m].
-    """
-
-    rotation: Array
-    places: tuple[Array, ...]
-    axes: tuple[Array, ...]
-    points: Array
-
-
 @compiled
 def gather_floating(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bool:
     """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
     As :func:`gather_planar`, with q (nq,), v (nv,); ``kept`` has ``turning`` before ``joints``, and
     last (5,) of the heading frame, x and y of its origin in the world [m], cosine and sine of the
-    heading, y of the trunk's hips from its origin [m], and :class:`Trunk` as a plain tuple.
+    heading, y of the trunk's hips from its origin [m]; and views of the trunk's rotation (3, 3) to
+    the world, of the places (3,) in the world [m] and axes (3, 3) of each hip's joint, and (n, 3) a
+    point of each hip's axis, from its joint and in its axes: in the plane in which the leg swings
+    [m].
     """
     views, data, out, base = kept.value
     centre, speed, _, momentum, weight, places, turns = views[:7]
