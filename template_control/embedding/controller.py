@@ -435,7 +435,10 @@ class EmbeddingController:
 
     def _decide(self, section: Section) -> None:
         s, learners, lateral = self.observer.now, self.learners, self.lateral
-        supervisor, reached, course = self.supervisor, None, self.course(self.time)
+        supervisor, reached = self.supervisor, None
+        # In the plane a robot turns round only where it rests.
+        asks = lateral is not None or section is REST
+        course = self.course(self.time) if asks else Course()
         if supervisor.deciding:
             nominal, ended = supervisor.decision.nominal, section.of(s.state)
             if self._turn(section, course, nominal):
