@@ -58,54 +58,51 @@ FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
 """Of a flight: it ends at the ground."""
 
 
+def _flight(name: str, *edges: Edge) -> Node:
+    return Node(name, Phase.F, None, None, (*edges, *FLIGHT_FAILURES))
+
+
+def _single(name: str, leg: Slot, *edges: Edge) -> Node:
+    return Node(name, Phase.SS, leg, None, edges)
+
+
+def _double(name: str, rear: Slot, front: Slot, *edges: Edge) -> Node:
+    return Node(name, Phase.DS, rear, front, (*edges, *DOUBLE_STANCE_FAILURES))
+
+
+def _curve(name: str, *edges: Edge) -> Node:
+    """A double stance that no springs carry."""
+    return Node(name, Phase.DS, None, None, (*edges, *CURVE_FAILURES))
+
+
 def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
     """VLO -> touchdown -> virtual bottom -> rear liftoff -> VLO.
 
     ``rear`` are slots of the rear leg's stiffness in double stance, before and after the bottom.
     """
+    lifts = Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}")
     return (
-        Node(
+        _single(
             f"SS_av^{gait}",
-            Phase.SS,
             Slot.K_SC,
-            None,
-            (
-                Edge(Event.TOUCHDOWN, f"DS_sc^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
-                *AWAITING_TOUCHDOWN_FAILURES,
-            ),
+            Edge(Event.TOUCHDOWN, f"DS_sc^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+            *AWAITING_TOUCHDOWN_FAILURES,
         ),
-        Node(
+        _double(
             f"DS_sc^{gait}",
-            Phase.DS,
             rear[0],
             Slot.K_SC,
-            (
-                Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
-                # The paper assumes a virtual bottom in every double stance; a short one of a
-                # disturbed walker ends without.
-                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
-                *DOUBLE_STANCE_FAILURES,
-            ),
+            Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
+            # The paper assumes a virtual bottom in every double stance; a short one of a
+            # disturbed walker ends without.
+            lifts,
         ),
-        Node(
-            f"DS_sd^{gait}",
-            Phase.DS,
-            rear[1],
-            Slot.K_SD,
-            (
-                Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}"),
-                *DOUBLE_STANCE_FAILURES,
-            ),
-        ),
-        Node(
+        _double(f"DS_sd^{gait}", rear[1], Slot.K_SD, lifts),
+        _single(
             f"SS_bv^{gait}",
-            Phase.SS,
             Slot.K_SD,
-            None,
-            (
-                Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True),
-                *SINGLE_STANCE_FAILURES,
-            ),
+            Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True),
+            *SINGLE_STANCE_FAILURES,
         ),
     )
 
@@ -113,111 +110,58 @@ def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
 def running() -> tuple[Node, ...]:
     """Apex -> touchdown -> bottom -> liftoff -> apex."""
     return (
-        Node(
-            "F_aa^r",
-            Phase.F,
-            None,
-            None,
-            (Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r"), *FLIGHT_FAILURES),
-        ),
-        Node(
+        _flight("F_aa^r", Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r")),
+        _single(
             "SS_sc^r",
-            Phase.SS,
             Slot.K_SC,
-            None,
-            (Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"), *RUNNING_STANCE_FAILURES),
+            Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"),
+            *RUNNING_STANCE_FAILURES,
         ),
-        Node(
+        _single(
             "SS_sd^r",
-            Phase.SS,
             Slot.K_SD,
-            None,
-            (
-                Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r"),
-                *RUNNING_STANCE_FAILURES,
-            ),
+            Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r"),
+            *RUNNING_STANCE_FAILURES,
         ),
-        Node(
-            "F_ba^r",
-            Phase.F,
-            None,
-            None,
-            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *FLIGHT_FAILURES),
-        ),
+        _flight("F_ba^r", Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True)),
     )
 
 
 def walk_to_run() -> tuple[Node, ...]:
     """The WRT stride: the rear leg walks, the front leg runs (Section IV-C1)."""
+    lifts = Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr")
     return (
-        Node(
+        _single(
             "SS_av^wr",
-            Phase.SS,
             Slot.K_SC,
-            None,
-            (
-                Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
-                # A walker that is too fast takes off before.
-                Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
-                *AWAITING_TOUCHDOWN_FAILURES[1:],
-            ),
+            Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
+            # A walker that is too fast takes off before.
+            Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
+            *AWAITING_TOUCHDOWN_FAILURES[1:],
         ),
-        Node(
-            "F_aa^wr",
-            Phase.F,
-            None,
-            None,
-            (Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr"), *FLIGHT_FAILURES),
-        ),
-        Node(
+        _flight("F_aa^wr", Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr")),
+        _double(
             "DS_sc^wr",
-            Phase.DS,
             Slot.K_SC,
             Slot.K_SC,
-            (
-                Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
-                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
-                *DOUBLE_STANCE_FAILURES,
-            ),
+            Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
+            lifts,
         ),
-        Node(
-            "DS_sd^wr",
-            Phase.DS,
-            Slot.K_SD,
-            Slot.K_SC_WR,
-            (
-                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
-                *DOUBLE_STANCE_FAILURES,
-            ),
-        ),
-        Node(
+        _double("DS_sd^wr", Slot.K_SD, Slot.K_SC_WR, lifts),
+        _single(
             "SS_sc^wr",
-            Phase.SS,
             Slot.K_SC_WR,
-            None,
-            (
-                Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
-                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-                *RUNNING_STANCE_FAILURES,
-            ),
+            Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
+            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+            *RUNNING_STANCE_FAILURES,
         ),
-        Node(
+        _single(
             "SS_sd^wr",
-            Phase.SS,
             Slot.K_SD_WR,
-            None,
-            (
-                Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
-                *RUNNING_STANCE_FAILURES,
-            ),
+            Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
+            *RUNNING_STANCE_FAILURES,
         ),
-        Node(
-            "F_ba^wr",
-            Phase.F,
-            None,
-            None,
-            (Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True), *FLIGHT_FAILURES),
-        ),
+        _flight("F_ba^wr", Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True)),
     )
 
 
@@ -228,26 +172,18 @@ def simplified_walk_to_run() -> tuple[Node, ...]:
     phase; from there on the stride is the real one.
     """
     return (
-        Node(
+        _single(
             "SS_av^wr*",
-            Phase.SS,
             Slot.K_SC,
-            None,
-            (
-                Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
-                *AWAITING_TOUCHDOWN_FAILURES,
-            ),
+            Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
+            *AWAITING_TOUCHDOWN_FAILURES,
         ),
-        Node(
+        _double(
             "DS_sc^wr*",
-            Phase.DS,
             Slot.K_SC,
             Slot.K_SC,
-            (
-                Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
-                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-                *DOUBLE_STANCE_FAILURES,
-            ),
+            Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
+            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
         ),
         Node(
             "SS_br^wr*",
@@ -267,29 +203,18 @@ def simplified_walk_to_run() -> tuple[Node, ...]:
 def run_to_walk() -> tuple[Node, ...]:
     """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
     return (
-        Node(
-            "F_aa^rw",
-            Phase.F,
-            None,
-            None,
-            (Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw"), *FLIGHT_FAILURES),
-        ),
-        Node(
+        _flight("F_aa^rw", Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw")),
+        _single(
             "SS_sc^rw",
-            Phase.SS,
             Slot.K_SC,
-            None,
-            (Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"), *RUNNING_STANCE_FAILURES),
+            Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"),
+            *RUNNING_STANCE_FAILURES,
         ),
-        Node(
+        _single(
             "SS_sd^rw",
-            Phase.SS,
             Slot.K_SD,
-            None,
-            (
-                Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
-                *SINGLE_STANCE_FAILURES,
-            ),
+            Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
+            *SINGLE_STANCE_FAILURES,
         ),
     )
 
@@ -300,74 +225,34 @@ def standing() -> tuple[Node, ...]:
     No springs carry their double stances: the CoM follows a curve in time there. The template's
     own simulator falls through them.
     """
+
+    def last(gait: str, target: str) -> Node:
+        """A walker's single stance, of which a curve is the next node."""
+        lands = Edge(Event.TOUCHDOWN, target, Reset.PLACE_FRONT, f"G_t^{gait}")
+        return _single(f"SS_av^{gait}", Slot.K_SC, lands, *AWAITING_TOUCHDOWN_FAILURES)
+
     return (
-        Node(
-            "DS_ar^s",
-            Phase.DS,
-            None,
-            None,
-            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True), *CURVE_FAILURES),
-        ),
-        Node(
-            "DS_ar^sw",
-            Phase.DS,
-            None,
-            None,
-            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw"), *CURVE_FAILURES),
-        ),
-        Node(
-            "SS_av^ws",
-            Phase.SS,
-            Slot.K_SC,
-            None,
-            (
-                Edge(Event.TOUCHDOWN, "DS_br^ws", Reset.PLACE_FRONT, "G_t^ws"),
-                *AWAITING_TOUCHDOWN_FAILURES,
-            ),
-        ),
-        Node(
-            "DS_br^ws",
-            Phase.DS,
-            None,
-            None,
-            (Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True), *CURVE_FAILURES),
-        ),
-        Node(
-            "SS_av^ww",
-            Phase.SS,
-            Slot.K_SC,
-            None,
-            (
-                Edge(Event.TOUCHDOWN, "DS_bl^ww", Reset.PLACE_FRONT, "G_t^ww"),
-                *AWAITING_TOUCHDOWN_FAILURES,
-            ),
-        ),
-        Node(
-            "DS_bl^ww",
-            Phase.DS,
-            None,
-            None,
-            (Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww"), *CURVE_FAILURES),
-        ),
+        _curve("DS_ar^s", Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True)),
+        _curve("DS_ar^sw", Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw")),
+        last("ws", "DS_br^ws"),
+        _curve("DS_br^ws", Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True)),
+        last("ww", "DS_bl^ww"),
+        _curve("DS_bl^ww", Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww")),
     )
 
 
 def _stepping(gait: str, lifts: Edge, rests: Edge) -> tuple[Node, ...]:
     """From a stand, over one leg, to a stand; ``lifts`` and ``rests`` begin and end it."""
     return (
-        Node(f"DS_al^{gait}", Phase.DS, None, None, (lifts, *CURVE_FAILURES)),
-        Node(
+        _curve(f"DS_al^{gait}", lifts),
+        _single(
             f"SS_bt^{gait}",
-            Phase.SS,
             Slot.K_SC,
-            None,
-            (
-                Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
-                Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-                Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
-            ),
+            Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
+            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+            Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
         ),
-        Node(f"DS_br^{gait}", Phase.DS, None, None, (rests, *CURVE_FAILURES)),
+        _curve(f"DS_br^{gait}", rests),
     )
 
 
