@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 from xml.etree import ElementTree
 
 import numpy as np
@@ -111,7 +112,67 @@ def pybullet() -> Any:
     return module
 
 
-class BulletPlant:
+class OptionsPlant:
+    """A plant that ``options`` describe, and a context manager; see :class:`~.plant.Plant`."""
+
+    options: Any
+
+    @property
+    def time_step(self) -> float:
+        """See :class:`~.plant.Plant`."""
+        return float(self.options.time_step)
+
+    def ground_height(self, x: float) -> float:
+        """See :class:`~.plant.Plant`."""
+        return float(self.options.ground_height(x))
+
+    def close(self) -> None:
+        """See :class:`~.plant.Plant`; there is nothing to give back."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class EnginePlant(OptionsPlant, ABC):
+    """A plant in a physics engine, whose contacts are gone through once a step.
+
+    A subclass sets ``_stale`` where they are others, and writes ``_forces`` (n, d) [N] and
+    ``_trunk_lies``.
+    """
+
+    def __init__(self, robot: Biped) -> None:
+        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
+        self._trunk_lies, self._stale = False, True
+
+    @abstractmethod
+    def _find_contacts(self) -> None:
+        """Add the ground's forces to ``_forces``, and set ``_trunk_lies`` where the trunk lies."""
+
+    def contact_forces(self, out: Array) -> None:
+        """See :meth:`~.plant.Plant.contact_forces`.
+
+        Averages over the last physics step: the first sample of a touchdown is an impulse
+        divided by that step.
+        """
+        self._read_contacts()
+        out[:] = self._forces
+
+    def trunk_touches_ground(self) -> bool:
+        """See :class:`~.plant.Plant`."""
+        self._read_contacts()
+        return self._trunk_lies
+
+    def _read_contacts(self) -> None:
+        if self._stale:
+            self._stale, self._trunk_lies = False, False
+            self._forces[:] = 0.0
+            self._find_contacts()
+
+
+class BulletPlant(EnginePlant):
     """A PyBullet world in DIRECT mode with its ground and one robot.
 
     Args:
@@ -128,8 +189,8 @@ class BulletPlant:
 
     @checked
     def __init__(self, robot: Biped, options: PlantOptions) -> None:
-        self.robot = robot
-        self.options = options
+        super().__init__(robot)
+        self.robot, self.options = robot, options
         p = self._engine = pybullet()
         self.client = c = p.connect(p.DIRECT)
         p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
@@ -151,9 +212,6 @@ class BulletPlant:
         self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
         self._trunk = self._trunk_link()
-        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
-        self._trunk_lies = False
-        self._stale = True  # whether the contacts of the last step are still to be asked for
         self._configure(len(info))
 
     def _load(self) -> int:
@@ -246,15 +304,6 @@ class BulletPlant:
         for link in range(-1, p.getNumJoints(self.body, physicsClientId=c)):
             p.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=c)
 
-    @property
-    def time_step(self) -> float:
-        """See :class:`~.plant.Plant`."""
-        return self.options.time_step
-
-    def ground_height(self, x: float) -> float:
-        """See :class:`~.plant.Plant`."""
-        return self.options.ground_height(x)
-
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
         self._stale = True
@@ -270,33 +319,13 @@ class BulletPlant:
             q[i] = state[0]
             v[i] = state[1]
 
-    def contact_forces(self, out: Array) -> None:
-        """Write the ground's force on each contact (n, d) [N], x first and up last, into ``out``.
-
-        Of soles (n, 6): then the moment about the world's origin [N m].
-
-        Averages over the last physics step: the first sample of a touchdown is an impulse
-        divided by that step.
-        """
-        self._read_contacts()
-        out[:] = self._forces
-
-    def trunk_touches_ground(self) -> bool:
-        """True where the trunk itself lies on the ground."""
-        self._read_contacts()
-        return self._trunk_lies
-
-    def _read_contacts(self) -> None:
-        """Ask for the contact points, once a step.
+    def _find_contacts(self) -> None:
+        """See :class:`~.engine.EnginePlant`.
 
         Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
-        if not self._stale:
-            return
-        self._stale, self._trunk_lies = False, False
         forces, axes = self._forces, AXES[self.robot.directions]
-        forces[:] = 0.0
         for contact in self._engine.getContactPoints(physicsClientId=self.client):
             sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
             foot = self._feet.get(link)
@@ -354,12 +383,6 @@ class BulletPlant:
     def close(self) -> None:
         """Disconnect; the plant is unusable afterwards."""
         self._engine.disconnect(self.client)
-
-    def __enter__(self) -> BulletPlant:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class FloatingBaseBulletPlant(BulletPlant):

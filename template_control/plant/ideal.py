@@ -22,6 +22,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive
 from template_control.errors import DivergedError
 from template_control.plant.agreement import check_damping, trunk_corners
+from template_control.plant.bullet import OptionsPlant
 from template_control.plant.rigid_contact import RollingFeet, pressing, solve
 from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
@@ -73,7 +74,7 @@ class IdealOptions(Checked):
         return self.ground.height_at(x)
 
 
-class IdealPlant:
+class IdealPlant(OptionsPlant):
     """Rigid ground and one robot, driven by joint torques.
 
     The integrator is the classical Runge-Kutta method of order four; touchdowns and releases
@@ -117,15 +118,6 @@ class IdealPlant:
         check_damping(self.robot, options.time_step)
         self._rubbing = np.flatnonzero(robot.joint_friction) + PLANAR_DOF
         self._trunk_corners = tuple(trunk_corners(self.robot).T.tolist())
-
-    @property
-    def time_step(self) -> float:
-        """See :class:`~.plant.Plant`."""
-        return self.options.time_step
-
-    def ground_height(self, x: float) -> float:
-        """See :class:`~.plant.Plant`."""
-        return self.options.ground_height(x)
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`.
@@ -214,15 +206,6 @@ class IdealPlant:
             if left <= 0.0:
                 return
         self._commit(*self._flow(left, self._rates(self._q, self._v)))
-
-    def close(self) -> None:
-        """See :class:`~.plant.Plant`; there is nothing to give back."""
-
-    def __enter__(self) -> IdealPlant:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _see(self, q: Array, v: Array) -> None:
         """Let the robot's update be at (q, v); no state is ever changed in place."""

@@ -13,7 +13,7 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_mass_matrix
-from template_control.plant.bullet import AXES, PlantOptions, moment
+from template_control.plant.bullet import AXES, EnginePlant, PlantOptions, moment
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.robot.biped import Biped
@@ -61,7 +61,7 @@ def _mujoco() -> Any:
     return mujoco
 
 
-class MujocoPlant:
+class MujocoPlant(EnginePlant):
     """A MuJoCo world with its ground and one robot.
 
     Args:
@@ -78,6 +78,7 @@ class MujocoPlant:
 
     @checked
     def __init__(self, robot: Biped, options: MujocoOptions) -> None:
+        super().__init__(robot)
         self.options = options
         self._engine = engine = _mujoco()
         try:
@@ -103,9 +104,6 @@ class MujocoPlant:
         self._common_ground = [i for i, has_own in enumerate(own) if not has_own]
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
-        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
-        self._trunk_lies = False
-        self._stale = True  # whether the contacts of the last step are still to be gone through
         check_mass_matrix(robot, "MuJoCo", self._mass_matrix)
 
     def _mass_matrix(self, q: Array) -> Array:
@@ -121,15 +119,6 @@ class MujocoPlant:
         """See :meth:`~.bullet.BulletPlant.set_friction`."""
         self.model.geom_friction[self._common_ground, 0] = friction
 
-    @property
-    def time_step(self) -> float:
-        """See :class:`~.plant.Plant`."""
-        return self.options.time_step
-
-    def ground_height(self, x: float) -> float:
-        """See :class:`~.plant.Plant`."""
-        return self.options.ground_height(x)
-
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
         self._stale = True
@@ -140,22 +129,8 @@ class MujocoPlant:
         """See :meth:`~.plant.Plant.read`."""
         q[:], v[:] = self.data.qpos[self._q], self.data.qvel[self._v]
 
-    def contact_forces(self, out: Array) -> None:
-        """See :meth:`~.plant.Plant.contact_forces`."""
-        self._read_contacts()
-        out[:] = self._forces
-
-    def trunk_touches_ground(self) -> bool:
-        """True where the trunk itself lies on the ground."""
-        self._read_contacts()
-        return self._trunk_lies
-
-    def _read_contacts(self) -> None:
-        """Go through the contacts, once a step."""
-        if not self._stale:
-            return
-        self._stale, self._trunk_lies = False, False
-        self._forces[:] = 0.0
+    def _find_contacts(self) -> None:
+        """See :class:`~.engine.EnginePlant`."""
         rows = self._forces.shape[1]
         axes, contacts = AXES[min(rows, UP + 1)], self.data.contact
         for i, shapes in enumerate(contacts.geom.tolist()):
@@ -179,15 +154,6 @@ class MujocoPlant:
         self.data.qfrc_applied[self._actuated] = torque
         self.data.xfrc_applied[self._trunk, 0] = push  # at the body's centre of mass
         self._engine.mj_step(self.model, self.data)
-
-    def close(self) -> None:
-        """See :class:`~.plant.Plant`; there is nothing to give back."""
-
-    def __enter__(self) -> MujocoPlant:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class FloatingBaseMujocoPlant(MujocoPlant):

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager, nullcontext
 from importlib.util import find_spec
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
-from template_control.plant.bullet import BulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.plant.mujoco import MujocoOptions, MujocoPlant
+from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
 from template_control.robot.biped import Biped
-from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.floating_biped import FloatingBaseBiped
 
 Array = NDArray[np.float64]
 
@@ -149,19 +149,34 @@ def robot_in(world: PlantOptions | IdealOptions, robot: R) -> R:
     return own if gravity == own.gravity else own.changed(gravity)
 
 
+_PLANTS: dict[type, tuple[Any, Any]] = {
+    IdealOptions: (IdealPlant, None),
+    MujocoOptions: (MujocoPlant, FloatingBaseMujocoPlant),
+    PlantOptions: (BulletPlant, FloatingBaseBulletPlant),
+}
+"""By its options, the plant of a planar and of a floating-base robot."""
+
+
 @checked
-def open_plant(robot: PlanarBiped, world: World) -> AbstractContextManager[Plant]:
+def open_plant(robot: Biped, world: World) -> AbstractContextManager[Plant]:
     """Make the plant that options describe, to be used as a context manager.
 
     Args:
         robot: the controller's model; the plant makes its own robot from it.
         world: options, whose type chooses the plant; or a plant, which is used as it is and is
             left open.
+
+    Raises:
+        ParameterError: if the plant is for planar robots, and the robot has a floating base.
     """
-    if isinstance(world, IdealOptions):
-        return IdealPlant(robot_in(world, robot), world)
-    if isinstance(world, MujocoOptions):
-        return MujocoPlant(robot_in(world, robot), world)
-    if isinstance(world, PlantOptions):
-        return BulletPlant(robot_in(world, robot), world)
-    return nullcontext(world)
+    if not isinstance(world, PlantOptions | IdealOptions):
+        return nullcontext(world)
+    planar, floating = next(of for kind, of in _PLANTS.items() if isinstance(world, kind))
+    made = floating if isinstance(robot, FloatingBaseBiped) else planar
+    if made is None:
+        raise ParameterError(
+            f"{robot.name} has a floating base, and the plant is {plant_name(world)}: give"
+            " PlantOptions or MujocoOptions"
+        )
+    found: AbstractContextManager[Plant] = made(robot_in(world, robot), world)
+    return found

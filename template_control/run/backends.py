@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from contextlib import AbstractContextManager, nullcontext
 from math import atan2, cos, degrees, sin
 
 import numpy as np
@@ -23,9 +22,6 @@ from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter
 from template_control.estimation.imu import ImuOptions, ImuSensors
-from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions
-from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
-from template_control.plant.plant import Plant, World, open_plant, plant_name, robot_in
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import (
@@ -62,16 +58,21 @@ class RobotBackend(ABC):
         """
 
     @abstractmethod
-    def plant(self, world: World) -> AbstractContextManager[Plant]:
-        """The robot in a world: options of a plant, or a plant."""
-
-    @abstractmethod
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """Sensors and estimators that give the controller its state."""
 
     @abstractmethod
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
         """A push, forward and to the left [N], as the robot's plant takes it after the torques."""
+
+
+def _apex_start(
+    controller: EmbeddingController, z: Array, planner: Planner, node: Node
+) -> ApexStart:
+    """An apex ``z`` (2 or 3,), in which the route's first gait has its feet."""
+    swing = phase_control(controller.options.phases, node).swing or controller.swings.other
+    pitch, automaton = controller.first_pitch(), controller.supervisor.automaton
+    return ApexStart(z[: APEX.dimension], planner.gait, swing, pitch, automaton)
 
 
 class PlanarBackend(RobotBackend):
@@ -84,10 +85,10 @@ class PlanarBackend(RobotBackend):
         """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns."""
         robot, route, pose = self.robot, controller.supervisor.route, o.pose
         controller.course = o.heading
-        first = planner, node = controller.supervisor.begin(route.section)
+        first = controller.supervisor.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
         if pose is None and route.section == APEX:
-            pose = self._apex_pose(controller, z[: APEX.dimension], planner, node)
+            pose = apex_pose(self.robot, _apex_start(controller, z, *first))
         if pose is None and route.section == REST:
             pose = self._standing_pose(controller, o)
         if pose is not None:
@@ -102,15 +103,6 @@ class PlanarBackend(RobotBackend):
         controller.start(first=first)
         return q, v
 
-    def _apex_pose(
-        self, controller: EmbeddingController, z: Array, planner: Planner, node: Node
-    ) -> Pose:
-        """The pose at an apex ``z`` (2,) in which the route's first gait has its feet."""
-        o, pitch = controller.options, controller.first_pitch()
-        swing = phase_control(o.phases, node).swing or controller.swings.other
-        automaton = controller.supervisor.automaton
-        return apex_pose(self.robot, ApexStart(z, planner.gait, swing, pitch, automaton))
-
     def _standing_pose(self, controller: EmbeddingController, o: Experiment) -> Pose:
         """At rest on the ground of the plant; a ParameterError if it is too steep for a start."""
         pose = standing_pose(controller.supervisor.route.parameters, ground=o.world.ground_height)
@@ -123,10 +115,6 @@ class PlanarBackend(RobotBackend):
                 f" begin where it is between {degrees(down):.1f} and {degrees(up):.1f} degrees"
             )
         return pose
-
-    def plant(self, world: World) -> AbstractContextManager[Plant]:
-        """See :meth:`RobotBackend.plant`."""
-        return open_plant(self.robot, world)
 
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """See :meth:`RobotBackend.senses`."""
@@ -207,7 +195,7 @@ class FloatingBackend(RobotBackend):
         lateral.reset(planner.gait)
         width = lateral.wish.width
         if route.section == APEX:
-            pose = self._apex_pose(controller, lateral, z[: APEX.dimension], first)
+            pose = self._apex_pose(lateral, _apex_start(controller, z, *first))
             q, v = floating_state_in(self.robot, pose)
             controller.start(pose.rear, pose.swung, first=first)
             return q, v
@@ -227,18 +215,11 @@ class FloatingBackend(RobotBackend):
         controller.start(_REAR, first=first)
         return q, v
 
-    def _apex_pose(
-        self,
-        controller: EmbeddingController,
-        lateral: LateralPlanner,
-        z: Array,
-        first: tuple[Planner, Node],
-    ) -> FloatingBasePose:
-        """The pose at an apex ``z`` (2,): the planar one, in the gait's lateral motion.
+    def _apex_pose(self, lateral: LateralPlanner, start: ApexStart) -> FloatingBasePose:
+        """The pose at an apex: the planar one, in the gait's lateral motion.
 
         The front leg's foot has stood last, and the rear leg's is about to land.
         """
-        (planner, node), o = first, controller.options
         stood = SIDES[1 - _REAR]
         away, drift = lateral.cycle.states[stood.row]
         foothold = -0.5 * lateral.cycle.steps[stood.row]
@@ -259,24 +240,8 @@ class FloatingBackend(RobotBackend):
                 in_flight=True,
             )
 
-        swing = phase_control(o.phases, node).swing or controller.swings.other
-        automaton = controller.supervisor.automaton
-        start = ApexStart(z, planner.gait, swing, controller.first_pitch(), automaton)
         return lifted(
             apex_pose(self.robot, start, lambda r, pose: floating_state_in(r, lifted(pose)))
-        )
-
-    def plant(self, world: World) -> AbstractContextManager[Plant]:
-        """See :meth:`RobotBackend.plant`; a ParameterError for a world without free robots."""
-        if isinstance(world, Plant) and not isinstance(world, PlantOptions):
-            return nullcontext(world)
-        if isinstance(world, MujocoOptions):
-            return FloatingBaseMujocoPlant(robot_in(world, self.robot), world)
-        if isinstance(world, PlantOptions):
-            return FloatingBaseBulletPlant(robot_in(world, self.robot), world)
-        raise ParameterError(
-            f"{self.robot.name} has a floating base, and the plant is {plant_name(world)}: give"
-            " PlantOptions or MujocoOptions"
         )
 
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:

@@ -23,7 +23,7 @@ from template_control.embedding.robot_template import template_for
 from template_control.embedding.state import SectionReport
 from template_control.errors import DivergedError, ParameterError
 from template_control.estimation.delay import DELAY
-from template_control.plant.plant import Plant, plant_name
+from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
@@ -161,7 +161,7 @@ class LiveRun:
             dt = o.world.time_step
             kept = None if keep is None else max(round(keep / dt), 1)
             self.recorder = Recorder(self.controller, o.record_every, conditions(o), keep=kept)
-            self.plant = stack.enter_context(self._backend.plant(o.world))
+            self.plant = stack.enter_context(open_plant(o.robot, o.world))
             self.plant.reset(q, v)
             self.hand = Hand(o, self.plant)
             # The robot's model is given back as one that goes where it faces.
