@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from template_control.compiled import compiled, inner_by_type
+from template_control.compiled import compiled, inner, inner_by_type
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
 from template_control.slip.control.modified_walking import Aim, modified_jacobian, modified_step
@@ -28,7 +28,6 @@ from template_control.slip.maps.return_map import (
     ReturnMap,
     one_stride,
     section_jacobian,
-    section_map,
 )
 from template_control.slip.maps.section import PADDED, section_of
 
@@ -64,7 +63,7 @@ class StrideEnd(NamedTuple):
         """(m,) where it ends, and how, with (NUM_SLOTS,) controls ``u``; (38) completes them."""
         at, result = self[:3], np.empty(RESULTS)
         if self.energy is None:
-            outcome = section_map(*at, u, self.work.scratch, result)
+            outcome = one_stride(*at, u, self.work.scratch, result)
         else:
             outcome = modified_step(*at, self.energy, u, self.work.scratch, result)
         return result[self.ends], Outcome(outcome)
@@ -123,45 +122,23 @@ class StrideProblem(NamedTuple):
     jacobian: Array
 
 
+@inner
 def _run(energy: Aim | None, p: StrideProblem) -> int:
-    """Run the stride of a problem; returns the Outcome's value."""
-    raise NotImplementedError
+    """Run the stride of a problem, with kappa_2 by (38) if it is; returns the Outcome's value."""
+    s, scratch = p.stride, p.stride.work.scratch
+    if energy is None:
+        return one_stride(s.kernel, s.kind, s.start, p.controls, scratch, p.result)
+    return modified_step(s.kernel, s.kind, s.start, energy, p.controls, scratch, p.result)
 
 
-@inner_by_type(_run)
-def _runs(energy: Any, p: Any) -> Any:
-    """As the stride is, or with kappa_2 by (38)."""
-
-    def plain(energy: Any, p: Any) -> Any:
-        s = p.stride
-        return one_stride(s.kernel, s.kind, s.start, p.controls, s.work.scratch, p.result)
-
-    def modified(energy: Any, p: Any) -> Any:
-        s, scratch = p.stride, p.stride.work.scratch
-        return modified_step(s.kernel, s.kind, s.start, s.energy, p.controls, scratch, p.result)
-
-    return plain if isinstance(energy, types.NoneType) else modified
-
-
+@inner
 def _derive(energy: Aim | None, p: StrideProblem, found: Derivatives) -> int:
-    """The derivatives of a problem's stride; returns the Outcome's value."""
-    raise NotImplementedError
-
-
-@inner_by_type(_derive)
-def _derives(energy: Any, p: Any, found: Any) -> Any:
-    """As the stride is, or with kappa_2 by (38)."""
-
-    def plain(energy: Any, p: Any, found: Any) -> Any:
-        s = p.stride
+    """The derivatives of the same; returns the Outcome's value."""
+    s = p.stride
+    if energy is None:
         return section_jacobian(s.kernel, s.kind, s.start, p.controls, p.columns, s.work, found)
-
-    def modified(energy: Any, p: Any, found: Any) -> Any:
-        s = p.stride
-        at = s.kernel, s.kind, s.start, s.energy
-        return modified_jacobian(at, p.controls, p.columns, s.work, found)
-
-    return plain if isinstance(energy, types.NoneType) else modified
+    at = s.kernel, s.kind, s.start, energy
+    return modified_jacobian(at, p.controls, p.columns, s.work, found)
 
 
 def of_type(problem: Any, kind: type) -> bool:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
 from numpy.typing import ArrayLike, NDArray
 
 from template_control.checks.checked import checked
-from template_control.compiled import compiled, inner, inner_by_type
+from template_control.compiled import compiled, inner
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -69,26 +68,14 @@ def closed_form(kind: MapKind) -> int | None:
     return None if kind is MapKind.EXACT else int(kind)
 
 
+@inner
 def _stride(
     kernel: Kernel, kind: int | None, state: Array, toes: Array, controls: Array, scratch: Scratch
 ) -> int:
     """One stride from ``state``, which is overwritten; returns the Outcome's value."""
     if kind is None:
-        return int(run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0])
-    return int(closed_form_stride(kernel, kind, state, toes, controls, scratch))
-
-
-@inner_by_type(_stride)
-def _branch(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
-    """The branch of :func:`_stride` that the type of ``kind`` takes: Numba would compile both."""
-
-    def exact(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
         return run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
-
-    def closed(kernel: Any, kind: Any, state: Any, toes: Any, controls: Any, scratch: Any) -> Any:
-        return closed_form_stride(kernel, kind, state, toes, controls, scratch)
-
-    return exact if isinstance(kind, types.NoneType) else closed
+    return closed_form_stride(kernel, kind, state, toes, controls, scratch)
 
 
 @inner
@@ -138,19 +125,6 @@ def one_stride(
     return outcome
 
 
-@inner
-def section_map(
-    kernel: Kernel,
-    kind: int | None,
-    z: Array,
-    controls: Array,
-    scratch: Scratch,
-    result: Array,
-) -> int:
-    """:func:`one_stride` for Python; compiled functions call that."""
-    return one_stride(kernel, kind, z, controls, scratch, result)
-
-
 @compiled
 def map_many(
     kernel: Kernel,
@@ -169,31 +143,16 @@ def map_many(
         outcome[i] = one_stride(kernel, kind, z[i], controls[i], scratch, result[i])
 
 
-def _jacobian(
-    kernel: Kernel,
-    kind: int | None,
-    z: Array,
-    controls: Array,
-    columns: IntArray,
-    work: MapWorkspace,
-    found: Derivatives,
-) -> int:
-    """Write all of ``found``; returns the Outcome's value."""
-    if kind is None:
-        return _tangents(kernel, kind, z, controls, columns, work, found)
-    return _differences(kernel, kind, z, controls, columns, work, found)
-
-
+@inner
 def _tangents(
     kernel: Kernel,
-    kind: None,
     z: Array,
     controls: Array,
     columns: IntArray,
     work: MapWorkspace,
     found: Derivatives,
 ) -> int:
-    """:func:`_jacobian` of the exact map, by :func:`~.tangent.stride_tangents`."""
+    """:func:`section_jacobian` of the exact map, by :func:`~.tangent.stride_tangents`."""
     scratch, tangents = work
     _begin(z, scratch)
     ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
@@ -209,6 +168,7 @@ def _tangents(
     return ended[0]
 
 
+@inner
 def _differences(
     kernel: Kernel,
     kind: int,
@@ -218,7 +178,7 @@ def _differences(
     work: MapWorkspace,
     found: Derivatives,
 ) -> int:
-    """:func:`_jacobian` of a closed form, by central differences."""
+    """:func:`section_jacobian` of a closed form, by central differences."""
     result, jacobian = found
     for c in range(columns.shape[0]):
         j = columns[c]
@@ -239,20 +199,6 @@ def _differences(
     return int(one_stride(kernel, kind, z, controls, work.scratch, result))
 
 
-@inner_by_type(_jacobian)
-def _derived(
-    kernel: Any,
-    kind: Any,
-    z: Any,
-    controls: Any,
-    columns: Any,
-    work: Any,
-    found: Any,
-) -> Any:
-    """The branch of :func:`_jacobian` that the type of ``kind`` takes."""
-    return _tangents if isinstance(kind, types.NoneType) else _differences
-
-
 @compiled
 def section_jacobian(
     kernel: Kernel,
@@ -270,7 +216,9 @@ def section_jacobian(
     0 to 2 the state, 3 + slot the controls. ``work`` and ``found`` are overwritten; ``z`` and
     ``controls`` are what they were afterwards.
     """
-    return _jacobian(kernel, kind, z, controls, columns, work, found)
+    if kind is None:
+        return _tangents(kernel, z, controls, columns, work, found)
+    return _differences(kernel, kind, z, controls, columns, work, found)
 
 
 class Mapped(NamedTuple):
@@ -357,20 +305,13 @@ class ReturnMap:
             distance covered, legs' lengths at the bottom; the outcome.
         """
         result = np.empty(RESULTS)
-        outcome = section_map(
-            *self.kernel, self.sections[0].padded(z), u, self.work.scratch, result
-        )
+        outcome = one_stride(*self.kernel, self.sections[0].padded(z), u, self.work.scratch, result)
         return result, Outcome(outcome)
 
     def step(self, z: Array, u: Array) -> tuple[Array, Outcome]:
         """As :meth:`evaluate`, but only the (m,) state at the next section."""
         result, outcome = self.evaluate(z, u)
         return result[: self.dimensions[1]], outcome
-
-    def _many(self, z: Array, u: Array) -> tuple[Array, IntArray]:
-        result, outcome = np.empty((len(z), RESULTS)), np.empty(len(z), dtype=np.int64)
-        map_many(*self.kernel, z, u, self.work.scratch, result, outcome)
-        return result, outcome
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
         """One stride and chosen derivatives without checks, for inner loops.
@@ -406,7 +347,9 @@ class ReturnMap:
         full = self.sections[0].padded(np.broadcast_to(states, (*shape, states.shape[-1])))
         flat_u = np.empty((*shape, NUM_SLOTS))
         flat_u[...] = inputs
-        result, outcome = self._many(full.reshape(count, PADDED), flat_u.reshape(count, NUM_SLOTS))
+        full, flat_u = full.reshape(count, PADDED), flat_u.reshape(count, NUM_SLOTS)
+        result, outcome = np.empty((count, RESULTS)), np.empty(count, dtype=np.int64)
+        map_many(*self.kernel, full, flat_u, self.work.scratch, result, outcome)
         result[outcome != Outcome.SECTION] = np.nan
         result = result.reshape(*shape, RESULTS)
         return Mapped(

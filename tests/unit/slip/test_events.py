@@ -11,7 +11,7 @@ from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, 
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls, simulate_stride
-from template_control.slip.maps.return_map import RESULTS, ReturnMap, closed_form, section_map
+from template_control.slip.maps.return_map import RESULTS, ReturnMap, closed_form, one_stride
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -212,7 +212,7 @@ def test_a_hop_of_milliseconds_is_a_flight_in_every_map(map_kind):
         ends, (ground, ground + rise**2 / (2.0 * P.gravity)), (rise, 0.0), strict=True
     ):
         z = np.array([3.0, y, v])
-        assert section_map(kernel, kind, z, u, new_scratch(), end) == Outcome.SECTION
+        assert one_stride(kernel, kind, z, u, new_scratch(), end) == Outcome.SECTION
     np.testing.assert_allclose(ends[0, :3], ends[1, :3], atol=1e-8)
 
 
