@@ -40,17 +40,17 @@ def shown(value: Any) -> str:
     return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
 
 
-def inward(low: float, high: float, digits: int = 3) -> str:
+def inward(low: float, high: float) -> str:
     """A range for a message, rounded so that both ends that are printed lie in it.
 
-    ``digits`` are those of the larger end.
+    The larger end has three digits.
     """
     size = max(abs(low), abs(high))
-    step = 10.0 ** (math.floor(math.log10(size)) + 1 - digits) if size > 0.0 else 1.0
+    step = 10.0 ** (math.floor(math.log10(size)) - 2) if size > 0.0 else 1.0
     first, last = math.ceil(low / step - 1e-9) * step, math.floor(high / step + 1e-9) * step
     if first > last:
         return f"{low!r} to {high!r}"
-    return f"{first:.{digits + 2}g} to {last:.{digits + 2}g}"
+    return f"{first:.5g} to {last:.5g}"
 
 
 def unaliased(hint: Any) -> Any:

@@ -94,13 +94,13 @@ class ErrorStudy:
         return len(self.distance)
 
 
-def study(grid: Grid | None = None, parameters: SlipParameters | None = None) -> ErrorStudy:
+def study(grid: Grid | None = None) -> ErrorStudy:
     """Compare the closed-form VLO maps with the exact one over a grid.
 
     A run is valid if the exact step completes and its energy allows the next touchdown, (29) and
-    (30). The grid replaces the template's stiffness; the default template is Table IV's.
+    (30). The grid replaces the stiffness of the template, which is Table IV's.
     """
-    p = parameters or SlipParameters()
+    p = SlipParameters()
     z, u = (grid or Grid()).states(p)
     tried = len(z)
     true = ReturnMap(p, StrideKind.WALK)(z, u)

@@ -54,25 +54,20 @@ class DeadbeatSet:
     controls: Array
 
 
-def backward_set(
-    gait: WalkingGait,
-    stiffness_range: tuple[float, float] = (0.5, 1.5),
-    counts: tuple[int, int] = (60, 180),
-) -> DeadbeatSet:
+def backward_set(gait: WalkingGait, counts: tuple[int, int] = (60, 180)) -> DeadbeatSet:
     """Integrate backward in time from a gait's VLO state over the controls.
 
     The dynamics are the same backward: the mirrored equilibrium, which is at k0, is walked forward
     with kappa_2 first and k0 after the virtual bottom. Its touchdown is the real step's liftoff,
     and the other way round; so the angle at that liftoff is the real touchdown angle.
-    ``stiffness_range`` is kappa_2's over k0; ``counts`` are of kappa_2 and of angles between 0 and
-    90 degrees.
+    ``counts`` are of kappa_2, from 0.5 to 1.5 k0, and of angles between 0 and 90 degrees.
     """
     p = gait.parameters
     start = VLO.state(VLO.mirror(gait.vlo))
     forward = ReturnMap(p)
     walk = StrideSimulator(p)
     states, controls = [], []
-    kappas = np.linspace(*stiffness_range, counts[0]) * p.leg_stiffness
+    kappas = np.linspace(0.5, 1.5, counts[0]) * p.leg_stiffness
     for kappa in counted(kappas, counts[0], "set of states"):
         for angle in np.radians(np.linspace(0.0, 90.0, counts[1] + 2)[1:-1]):
             u = np.zeros(NUM_SLOTS)
@@ -112,14 +107,12 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
     return ReturnMap(p)(found.state, controls).state
 
 
-def settles(
-    ends: Array, branch: list[BranchPoint], gait: WalkingGait, limit: int = 50
-) -> NDArray[np.bool_]:
+def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> NDArray[np.bool_]:
     """(n,) True if passive walking from a VLO state converges to the equilibria of a branch.
 
     The touchdown angle is that of the equilibrium with the state's energy; ``branch`` are stable
     equilibria with the height of ``gait``, energy rising or falling. ``ends`` (n, 3) that are NaN
-    do not settle; ``limit`` is the number of steps.
+    do not settle.
     """
     p = gait.parameters
     order = np.argsort([point.energy for point in branch])
@@ -131,7 +124,7 @@ def settles(
     u[:, Slot.TOUCHDOWN_ANGLE] = np.interp(energy, energies, angles)
     z = np.where(inside[:, None], ends, np.nan)
     goal = np.array([gait.vlo[1], 0.0])
-    return steps_to_fall(p, z, u, goal, limit).converges
+    return steps_to_fall(p, z, u, goal).converges
 
 
 def inside_share(

@@ -121,7 +121,7 @@ def _drawn(strides: list[tuple[str, Stride]], title: str) -> Any:
     toes = np.zeros(2)
     legs: list[tuple[Array, Array]] = []
     for t in np.linspace(0.0, main.duration, 25):
-        row = int(np.clip(np.searchsorted(main.meta[:, 0], t, side="right") - 1, 0, None))
+        row = int(main.rows(t))
         com = main.sample(t)[0, :2]
         toes = main.meta[row, 3:5]
         for leg in range(2):

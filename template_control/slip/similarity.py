@@ -62,11 +62,6 @@ def tuned(default: T, *dimensions: Dimension) -> T:
     return found
 
 
-def dimensions_of(options: Any) -> dict[str, tuple[Dimension, ...]]:
-    """Dimensions of an options object's fields by name; fields without one are left out."""
-    return {f.name: f.metadata[_KEY] for f in fields(options) if _KEY in f.metadata}
-
-
 @dataclass(frozen=True)
 class Scale(Checked):
     """Units of a template over those of the reference template.

@@ -23,7 +23,7 @@ from template_control.slip.control.stride_solver import (
 )
 from template_control.slip.dynamics.stride import controls, finite
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
-from template_control.slip.maps.section import APEX, VLO, Section
+from template_control.slip.maps.section import VLO, Section
 from template_control.slip.parameters import SlipParameters
 
 Array = NDArray[np.float64]
@@ -31,8 +31,14 @@ Array = NDArray[np.float64]
 _ANGLE, _K_SC, _K_SD = Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD
 # A leg that touches the ground at the apex has a map without derivatives; so much flatter it falls
 # for 8 ms [rad].
-_TOP_MARGIN = 0.001
+_APEX_MARGIN = 0.001
+_KAPPA_2 = np.array((0.5, 1.5))  # bounds over k0
 _LANDING = (_ANGLE, _K_SC, _K_SD)
+# Bounds of the touchdown angle [deg]: a flatter leg would need a friction coefficient over 1 to
+# land on, a vertical one would make no step.
+_ANGLES = 45.0, 89.9
+_STIFFNESSES = 0.05, 20.0  # bounds [k0]; wide, as they only keep the search from running away
+_SEEDS = 3  # of the grid: the nearest minimum need not be the best, and each takes a search
 _REACHED = 1e-3  # residual that counts as reached
 _ACCEPTABLE = 0.05  # residual below which no further start is tried
 
@@ -67,27 +73,23 @@ class Design:
             k0]. All other controls are 70 deg and k0.
         dense: whether that grid shows every minimum; then only a guess that reaches the target is
             taken without looking at it.
-        angles: bounds of the touchdown angle [deg]: a flatter leg would need a friction coefficient
-            over 1 to land on, a vertical one would make no step.
-        stiffnesses: bounds of the leg stiffnesses [k0]; wide, as they only keep the search from
-            running away.
-        seeds: how many of the grid's best points are searched from; the nearest minimum need not be
-            the best, and each seed takes a search.
+        margin: the touchdown angle stays this far below asin(y / l0), at which the leg is on the
+            ground at once [rad]; None: it may be steeper.
+        compression: wanted length of the leg at the bottom [l0]; None: any.
     """
 
     stride: str
     free: tuple[Slot, ...]
     axes: Mapping[tuple[Slot, ...], ArrayLike]
     dense: bool = False
-    angles: tuple[float, float] = (45.0, 89.9)
-    stiffnesses: tuple[float, float] = (0.05, 20.0)
-    seeds: int = 3
+    margin: float | None = None
+    compression: float | None = None
 
     def table(self, parameters: SlipParameters) -> Array:
         """(4, f) of a :class:`~.stride_solver.Prior`, whose base each start of the search is."""
         k0 = parameters.leg_stiffness
         angle = [slot is _ANGLE for slot in self.free]
-        (flattest, steepest), (softest, stiffest) = np.radians(self.angles), self.stiffnesses
+        (flattest, steepest), (softest, stiffest) = np.radians(_ANGLES), _STIFFNESSES
         unit = np.where(angle, 1.0, k0)
         lower = np.where(angle, flattest, softest * k0)
         return np.array([lower, unit, lower, np.where(angle, steepest, stiffest * k0)])
@@ -111,6 +113,8 @@ ACTIVE_RUNNING = Design(
         (_ANGLE,): np.arange(52.0, 81.0, 4.0),
         (_K_SC, _K_SD): (0.7, 1.0, 1.4, 2.0, 3.0),
     },
+    margin=_APEX_MARGIN,
+    compression=0.9,
 )
 ACTIVE_WALKING = Design(
     stride=StrideKind.WALK,
@@ -122,6 +126,7 @@ MODIFIED_WALKING = Design(
     free=(_ANGLE,),
     axes={(_ANGLE,): np.arange(58.0, 81.0, 1.0)},
     dense=True,
+    margin=0.05,
 )
 WALK_TO_RUN = Design(
     stride=StrideKind.WALK_TO_RUN,
@@ -139,16 +144,16 @@ RUN_TO_WALK = Design(
         (_K_SC,): (1.0, 2.0, 3.5, 5.5),
         (_K_SD,): (0.8, 1.1, 1.5),
     },
+    margin=_APEX_MARGIN,
 )
 
 
 class Controller:
-    """Finds the controls of one stride by least squares on a return map, (36).
+    """Finds the controls of one stride by least squares on a return map, (36) with weights of 1.
 
     Args:
         parameters: the template.
         kind: of return map.
-        weights: (m,) rho of (36), one a number of the target; 1 each by default.
 
     Attributes:
         design: the stride, its free controls, and where the search begins.
@@ -157,29 +162,22 @@ class Controller:
     design: ClassVar[Design]
 
     @checked
-    def __init__(
-        self,
-        parameters: SlipParameters,
-        kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] | None = None,
-    ) -> None:
-        self._search_on(ReturnMap(parameters, self.design.stride, kind), weights)
+    def __init__(self, parameters: SlipParameters, kind: MapKind = MapKind.EXACT) -> None:
+        self._search_on(ReturnMap(parameters, self.design.stride, kind))
 
-    def _search_on(
-        self, step: ReturnMap, weights: Sequence[float] | None, compression: float | None = None
-    ) -> None:
-        """Search on a map; ``compression`` is the leg's wanted length at the bottom [m]."""
+    def _search_on(self, step: ReturnMap) -> None:
+        """Search on a map."""
+        design, length = self.design, step.parameters.rest_length
         self._map = step
         self._energy: Aim | None = None  # by which kappa_2 is chosen, where it is
-        self._compression = [] if compression is None else [compression]
+        self._compression = [] if design.compression is None else [design.compression * length]
         self._also = (REAR_BOTTOM,) * len(self._compression)
-        rows = step.dimensions[1] + len(self._also)
-        self._weights = np.diag(np.sqrt(np.ones(rows) if weights is None else np.asarray(weights)))
-        self._slots = [int(slot) for slot in self.design.free]
-        self._table = self.design.table(step.parameters)
-        self._grid = self.design.grid(step.parameters)
-        # A steeper leg would be in the ground at an apex.
-        self._margin = _TOP_MARGIN if step.dimensions[0] == APEX.dimension else None
+        self._slots = [int(slot) for slot in design.free]
+        self._table = design.table(step.parameters)
+        self._grid = design.grid(step.parameters)
+
+    def _prepare(self, target: Array, guess: Array | None) -> None:
+        """What a stride's search depends on besides; arguments as for :meth:`solve`."""
 
     def solve(
         self,
@@ -200,10 +198,11 @@ class Controller:
         design, (n, m) = self.design, self._map.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
+        self._prepare(aim, guess)
         aim = np.append(aim, self._compression)
         table = self._table.copy()
-        if self._margin is not None:
-            top = np.arcsin(min(start[1] / self._map.parameters.rest_length, 1.0)) - self._margin
+        if design.margin is not None:
+            top = np.arcsin(min(start[1] / self._map.parameters.rest_length, 1.0)) - design.margin
             turns = self._slots.index(_ANGLE)
             table[2:, turns] = np.minimum(table[2:, turns], top)
         stride = whole(self._map, start, self._also)._replace(energy=self._energy)
@@ -211,7 +210,7 @@ class Controller:
         if near is not None and near.residual <= (_REACHED if design.dense else _ACCEPTABLE):
             return near
         costs = np.array([self._cost(stride, aim, u) for u in self._grid])
-        seeds = np.argsort(costs)[: design.seeds]
+        seeds = np.argsort(costs)[:_SEEDS]
         if near is not None and design.dense:
             # A seed worse than what is found leads nowhere better.
             seeds = seeds[costs[seeds] <= near.residual**2]
@@ -228,23 +227,23 @@ class Controller:
         """The best controls that are found from some; ``aim`` has the compression too."""
         table[0] = np.clip(start[self._slots], *table[2:])
         prior = Prior(start, self._slots, table, TARGET_ONLY, LEAST_PULL)
-        u, _ = solve_stride(stride, aim, prior, self._weights)
+        u, _ = solve_stride(stride, aim, prior, np.eye(len(aim)))
         end, outcome = stride(u)
         residual = np.inf
         if outcome is Outcome.SECTION:
-            residual = float(np.linalg.norm(self._weights @ (aim - end)))
+            residual = float(np.linalg.norm(aim - end))
         predicted = end[: self._map.dimensions[1]]
         return StepSolution(u, predicted, residual, outcome, residual <= _REACHED)
 
     def _cost(self, stride: StrideEnd, aim: Array, u: Array) -> float:
-        """Weighted squared error, as in (36); inf where the stride fails."""
+        """Squared error, as in (36); inf where the stride fails."""
         end, outcome = stride(u.copy())
-        error = self._weights @ (aim - end)
+        error = aim - end
         return float(error @ error) if outcome is Outcome.SECTION else np.inf
 
     def _check(self, target: Array) -> None:
         p = self._map.parameters
-        lowest = p.rest_length * np.sin(np.radians(self.design.angles[0]))
+        lowest = p.rest_length * np.sin(np.radians(_ANGLES[0]))
         if not target[0] > 0.0:
             raise ParameterError(f"target speed is {target[0]:g} m/s: give a positive one")
         if target[1] <= lowest:
@@ -260,27 +259,12 @@ class Controller:
 
 
 class ActiveRunning(Controller):
-    """Apex to apex with both stiffnesses and the angle: (34) to (36).
+    """Apex to apex with both stiffnesses and the angle: (34) to (36); see :class:`Controller`.
 
-    Args:
-        parameters: the template.
-        kind: of return map.
-        weights: (3,) rho of dx/dt, y and the leg's compression; 1 each by default.
-        compression: length of the leg at the bottom over its rest length.
+    The leg is wanted to be 0.9 l0 long at the bottom.
     """
 
     design = ACTIVE_RUNNING
-
-    @checked
-    def __init__(
-        self,
-        parameters: SlipParameters,
-        kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] | None = None,
-        compression: float = 0.9,
-    ) -> None:
-        length = compression * parameters.rest_length
-        self._search_on(ReturnMap(parameters, self.design.stride, kind), weights, length)
 
 
 class ActiveWalking(Controller):
@@ -290,55 +274,25 @@ class ActiveWalking(Controller):
 
 
 class ModifiedWalking(Controller):
-    """VLO to VLO with the angle; kappa_1 is given and kappa_2 follows from energy, (38).
+    """VLO to VLO with the angle; kappa_2 follows from energy, (38); see :class:`Controller`.
 
-    Args:
-        parameters: the template.
-        kind: of return map.
-        weights: (3,) rho; 1 each by default.
-        kappa_1: stiffness until the virtual bottom [N/m]; k0 by default.
-        stiffness_range: bounds of kappa_2 over k0.
-        top_margin: the angle stays this far [rad] below asin(y / l0), at which the front leg
-            would touch down at once.
+    kappa_1 is k0, and kappa_2 from 0.5 to 1.5 k0. One control seldom reaches all of the target.
     """
 
     design = MODIFIED_WALKING
 
-    @checked
-    def __init__(
-        self,
-        parameters: SlipParameters,
-        kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] | None = None,
-        kappa_1: float | None = None,
-        stiffness_range: tuple[float, float] = (0.5, 1.5),
-        top_margin: float = 0.05,
-    ) -> None:
-        k0 = parameters.leg_stiffness
-        self._search_on(ReturnMap(parameters, self.design.stride, kind), weights)
-        if kappa_1 is not None:
-            self._grid[:, Slot.K_SC] = kappa_1
-        self._range = k0 * np.array(stiffness_range)
-        self._margin = top_margin
-
-    def solve(
-        self,
-        z: Sequence[float] | Array,
-        target: Sequence[float] | Array,
-        guess: Array | None = None,
-    ) -> StepSolution:
-        """See :meth:`Controller.solve`; one control seldom reaches all of the target."""
-        self._energy = Aim(finite("target", target, 3), self._range)
-        return super().solve(z, target, guess)
+    def _prepare(self, target: Array, guess: Array | None) -> None:
+        self._energy = Aim(target, _KAPPA_2 * self._map.parameters.leg_stiffness)
 
 
 class WalkToRun(Controller):
     """VLO to apex with the front leg's stiffnesses before and after its bottom: (39) to (41).
 
+    A guess's touchdown angle, k_sc and k_sd, which are the walking controller's, are kept.
+
     Args:
         parameters: the template.
         kind: of return map.
-        weights: (2,) rho; 1 each by default.
         simplified: ignore the rear leg after the virtual bottom, as the paper's controller
             does; its reference then has to be tuned (Table IV).
     """
@@ -350,29 +304,14 @@ class WalkToRun(Controller):
         self,
         parameters: SlipParameters,
         kind: MapKind = MapKind.EXACT,
-        weights: Sequence[float] | None = None,
         simplified: bool = False,
     ) -> None:
         stride = self.design.stride + ("*" if simplified else "")
-        self._search_on(ReturnMap(parameters, stride, kind), weights)
+        self._search_on(ReturnMap(parameters, stride, kind))
 
-    def solve(
-        self,
-        z: Sequence[float] | Array,
-        target: Sequence[float] | Array,
-        guess: Array | None = None,
-    ) -> StepSolution:
-        """See :meth:`Controller.solve`.
-
-        Args:
-            z: (3,) VLO state.
-            target: (2,) apex state.
-            guess: (NUM_SLOTS,) its touchdown angle, k_sc and k_sd, which are the walking
-                controller's, are kept.
-        """
+    def _prepare(self, target: Array, guess: Array | None) -> None:
         if guess is not None:
             self._grid[:, :3] = guess[:3]
-        return super().solve(z, target, guess)
 
 
 class RunToWalk(Controller):

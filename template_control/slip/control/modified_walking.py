@@ -31,6 +31,11 @@ IntArray = NDArray[np.int64]
 _K_SC = int(Slot.K_SC)
 _K_SD = int(Slot.K_SD)
 _SECTION = int(Outcome.SECTION)
+_GRIDS, _COARSE, _FINE = 3, 9, 5  # of angles; points of the first grid, and of each later one
+_NARROWING = 0.75  # half-width of a grid over the spacing before: its outer angles are new ones
+_SECOND_WEIGHT = 0.1  # of the second step's squared residual: the first is to reach the target
+_FAILURE = 10.0  # in place of it, where that step fails [m^2/s^2]: more than any residual
+_FALL = 1e6  # added where the first step itself fails [m^2/s^2]
 
 
 class Aim(NamedTuple):
@@ -47,28 +52,12 @@ class AngleSearch(NamedTuple):
         nominal: angle of the step after the first [rad].
         least, greatest: angles to try [rad].
         kappa_1: stiffness before the virtual bottom [N/m].
-        coarse, fine: angles of the first grid, over all of the range, and of each later one.
-        grids: how many, each about the best angle of the one before.
-        narrowing: half-width of a grid over the spacing of the one before: under 1, so that its
-            outer angles are not those just tried.
-        second_weight: of the squared residual after the second step, the first's counting 1; small,
-            as the first is to reach the target.
-        failure: counts in place of it where the second step fails [m^2/s^2]; more than any
-            residual, so that a step after which the template walks on goes before.
-        fall: added where the first step itself fails [m^2/s^2].
     """
 
     nominal: float
     least: float
     greatest: float
     kappa_1: float
-    coarse: int = 9
-    fine: int = 5
-    grids: int = 3
-    narrowing: float = 0.75
-    second_weight: float = 0.1
-    failure: float = 10.0
-    fall: float = 1e6
 
 
 @compiled
@@ -143,8 +132,8 @@ def search_angle(
     best_cost, best_alpha, best_kappa, best_residual = np.inf, nominal, kappa_1, np.inf
     best_outcome = -1
     low, high = search.least, search.greatest
-    for grid in range(search.grids):
-        count = search.coarse if grid == 0 else search.fine
+    for grid in range(_GRIDS):
+        count = _COARSE if grid == 0 else _FINE
         for i in range(count):
             alpha = low + (high - low) * i / (count - 1)
             u[0], u[_K_SC] = alpha, kappa_1
@@ -152,20 +141,20 @@ def search_angle(
             kappa_2 = u[_K_SD]
             residual = np.sum((z1[:3] - target) ** 2)
             if outcome != _SECTION:
-                cost = search.fall + residual
+                cost = _FALL + residual
             else:
                 u[0] = nominal
                 following = modified_step(kernel, kind, z1[:3], aim, u, scratch, z2)
-                second = search.second_weight * np.sum((z2[:3] - target) ** 2)
-                cost = residual + (second if following == _SECTION else search.failure)
+                second = _SECOND_WEIGHT * np.sum((z2[:3] - target) ** 2)
+                cost = residual + (second if following == _SECTION else _FAILURE)
             if cost < best_cost or best_outcome < 0:
                 best_cost, best_alpha, best_kappa = cost, alpha, kappa_2
                 best_residual, best_outcome = residual, outcome
                 for j in range(3):
                     z_next[j] = z1[j]
         width = (high - low) / (count - 1)
-        low = max(search.least, best_alpha - search.narrowing * width)
-        high = min(search.greatest, best_alpha + search.narrowing * width)
+        low = max(search.least, best_alpha - _NARROWING * width)
+        high = min(search.greatest, best_alpha + _NARROWING * width)
     return best_outcome, best_alpha, best_kappa, best_residual
 
 

@@ -84,10 +84,14 @@ class Stride:
         """Time of the first firing of ``event`` [s]; NaN if it did not fire."""
         return next((e.time for e in self.events if e.event is event), np.nan)
 
+    def rows(self, times: ArrayLike) -> NDArray[np.intp]:
+        """Indices of the segments in which ``times`` [s] are; those of the ends beyond them."""
+        return np.maximum(np.searchsorted(self.meta[:, 0], times, side="right") - 1, 0)
+
     def sample(self, times: ArrayLike) -> Array:
         """States at ``times`` [s]: (n, 6) x, y, dx/dt, dy/dt, d2x/dt2, d2y/dt2."""
         t = np.atleast_1d(np.asarray(times, dtype=float))
-        row = np.clip(np.searchsorted(self.meta[:, 0], t, side="right") - 1, 0, len(self.meta) - 1)
+        row = self.rows(t)
         local = t - self.meta[row, 0]
         out = np.empty((t.size, 6))
         powers = local[:, None] ** np.arange(self.cx.shape[1])
@@ -102,9 +106,7 @@ class Stride:
 
     def nodes(self, times: ArrayLike) -> list[str]:
         """Name of the automaton's node at each of ``times`` [s]."""
-        t = np.atleast_1d(np.asarray(times, dtype=float))
-        row = np.clip(np.searchsorted(self.meta[:, 0], t, side="right") - 1, 0, len(self.meta) - 1)
-        return [self.node_names[int(i)] for i in self.meta[row, 2]]
+        return [self.node_names[int(i)] for i in self.meta[self.rows(np.atleast_1d(times)), 2]]
 
 
 @checked
@@ -248,7 +250,6 @@ def simulate_stride(
     state: Sequence[float] | Array,
     u: Array,
     toes: Sequence[float] | Array = (0.0, 0.0),
-    max_time: float | None = None,
     automaton: Automaton = AUTOMATON,
 ) -> Stride:
     """Simulate one stride on the exact model.
@@ -261,10 +262,9 @@ def simulate_stride(
         state: (4,) x, y, dx/dt, dy/dt [m, m/s].
         u: (NUM_SLOTS,) controls from :func:`controls`.
         toes: (2,) x of the rear and front toe [m].
-        max_time: give up after this time [s]; default 20 sqrt(l0/g).
         automaton: that the stride is of.
 
     Raises:
         ParameterError: for NaN, a wrong shape, or if there is no node ``start``.
     """
-    return StrideSimulator(parameters, automaton, max_time).run(start, state, u, toes)
+    return StrideSimulator(parameters, automaton).run(start, state, u, toes)

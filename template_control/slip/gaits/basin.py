@@ -27,11 +27,11 @@ Array = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _MOST = 100_000  # steps
-_Number = Annotated[int, Range(1, 1000)]
 _SECTION = int(Outcome.SECTION)
 _WINDOW = 5
 _THERE = 0.01  # as near as this, it need not come nearer
 _SHRINKS = 0.95  # of the distance half-way must be left at most: no other gait, no cycle
+_LARGEST, _RADII, _DIRECTIONS = 0.05, 50, 32  # of the discs of a margin; the first over l0
 _HEIGHT, _ANGLE = 0.01, np.radians(1.0)  # what counts as equally far, per l0 and in angle
 
 
@@ -177,8 +177,6 @@ def margin(
     controls: Annotated[Array, Shape((NUM_SLOTS,))],
     goal: tuple[float, float],
     energy: float,
-    largest: Annotated[float, Range(0.0, 1.0, above=True)] = 0.05,
-    counts: tuple[_Number, _Number] = (50, 32),
 ) -> float:
     """Radius of the largest disc around a gait from which walking converges to it.
 
@@ -187,14 +185,12 @@ def margin(
         controls: (NUM_SLOTS,) of the gait.
         goal: its y [m] and phi [rad] at VLO.
         energy: its energy [J]; all states of the disc have it.
-        largest: where to stop looking, over l0.
-        counts: numbers of radii and of directions.
 
     Returns:
-        The radius over l0 in height; in velocity angle 1 degree counts as 0.01.
+        The radius over l0 in height, 0.05 at most; in velocity angle 1 degree counts as 0.01.
     """
-    radii = np.linspace(largest / counts[0], largest, counts[0])
-    turn = np.linspace(0.0, 2.0 * np.pi, counts[1], endpoint=False)
+    radii = np.linspace(_LARGEST / _RADII, _LARGEST, _RADII)
+    turn = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS, endpoint=False)
     r, t = np.meshgrid(radii, turn, indexing="ij")
     y = goal[0] + r * parameters.rest_length * np.cos(t)
     phi = goal[1] + r / _HEIGHT * _ANGLE * np.sin(t)

@@ -148,7 +148,7 @@ def stance_figures(gait: WalkingGait, leg: float = FamilyCost.leg) -> tuple[floa
     stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
     times = np.linspace(0.0, stride.duration, _SAMPLES)
     x, y = stride.sample(times)[:, :2].T
-    row = np.clip(np.searchsorted(stride.meta[:, 0], times, "right") - 1, 0, len(stride.meta) - 1)
+    row = stride.rows(times)
     torque = 0.0
     for toe, k in ((3, 5), (4, 6)):
         length = np.hypot(x - stride.meta[row, toe], y)
@@ -192,6 +192,8 @@ _FAST = (
 )
 _STRETCH = 6  # half-width of what is moved at a time, in links
 _TOO_SHORT = 1e3
+_MOVED = 0.4, 0.2  # of a gait in the first and in the last round of the descent, in natural changes
+_SMOOTHING = 0.5  # of a round, in squared spacings of the chain
 _MOVES = np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
 
 
@@ -203,15 +205,11 @@ class SearchEffort:
         spacing: of a chain's speeds at VLO [m/s].
         settling: rounds of smoothing, before the descent and after it.
         rounds: of the descent; each takes a minute or more.
-        moves: of a gait in the first and in the last round, in natural changes.
-        smoothing: of a round, in squared spacings of the chain.
     """
 
     spacing: float = 0.015
     settling: int = 12
     rounds: int = 0
-    moves: tuple[float, float] = (0.4, 0.2)
-    smoothing: float = 0.5
 
 
 class Member(NamedTuple):
@@ -240,13 +238,13 @@ def _search(
 ) -> list[Member]:
     speeds, chain = _rough(rough, o.spacing)
     for _ in range(o.settling):
-        chain = _smoothed(_on_gaits(speeds, chain), o.smoothing)
-    for number, move in enumerate(np.linspace(*o.moves, o.rounds)):
+        chain = _smoothed(_on_gaits(speeds, chain), _SMOOTHING)
+    for number, move in enumerate(np.linspace(*_MOVED, o.rounds)):
         chain = _descended(speeds, _on_gaits(speeds, chain), float(move), w)
         if progress is not None:
             progress(f"{len(speeds)} gaits from {speeds[0]:.3g} m/s: round {number + 1} is done")
     for _ in range(o.settling):
-        chain = _smoothed(_on_gaits(speeds, chain), 0.1 * o.smoothing)
+        chain = _smoothed(_on_gaits(speeds, chain), 0.1 * _SMOOTHING)
     gaits = [nearest_gait(REFERENCE, v, x) for v, x in zip(speeds.tolist(), chain, strict=True)]
     return [Member(gait, gait_figures(gait, w)) for gait in gaits]
 

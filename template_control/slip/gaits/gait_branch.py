@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.checks.ranges import Count, Vector
+from template_control.checks.ranges import Vector
 from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.control.controllers import VARIED, TargetedPolicy
@@ -150,6 +150,7 @@ def energy_gradient(
 Policy = Callable[[Array], Array]
 """Controls (NUM_SLOTS,) at a section state (n,)."""
 _DIFFERENCE = 1e-6
+_ITERATIONS = 30
 _NOISE = 1e-5  # of eigenvalues: a controller's search ends at 1e-10, over the difference
 
 
@@ -246,7 +247,7 @@ def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisatio
 
 @checked
 def controlled_fixed_point(
-    step: ReturnMap, policy: Policy, start: Vector, iterations: Count = 30
+    step: ReturnMap, policy: Policy, start: Vector
 ) -> tuple[Array, NDArray[np.complex128]]:
     """Find where a controlled stride settles: Newton's method on z = P(z, u(z)).
 
@@ -255,7 +256,6 @@ def controlled_fixed_point(
         policy: controls (NUM_SLOTS,) at a state (n,), such as
             ``lambda z: controller.solve(z, target).controls``.
         start: (n,) first guess.
-        iterations: of Newton's method at most.
 
     Returns:
         (n,) the state; (n,) eigenvalues of the closed loop there.
@@ -264,7 +264,7 @@ def controlled_fixed_point(
         GaitError: if a stride fails on the way, or there is no convergence.
     """
     z = np.array(start, dtype=float)
-    for _ in range(iterations):
+    for _ in range(_ITERATIONS):
         linear, closed, _ = closed_loop(step, policy, z)
         if linear.outcome is not Outcome.SECTION:
             raise GaitError(f"the controlled stride fails near {z.tolist()}")

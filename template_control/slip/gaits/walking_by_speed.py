@@ -100,7 +100,7 @@ def _stride(x: Array, vlo_speed: float, weight: float, length: float) -> tuple[A
 
 
 _FILE = "walking.json"
-_XTOL, _RTOL = 1e-13, 8.881784197001252e-16  # of dimensionless speeds; scipy's least
+_XTOL, _RTOL = 1e-10, 8.881784197001252e-16  # of speeds; scipy's least
 _ROUNDING = 1e-6  # of a centimetre per second
 
 
@@ -341,7 +341,6 @@ class WalkingFamily:
 
 
 _VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
-_XTOL, _RTOL = 1e-10, 8.881784197001252e-16  # of speeds [m/s]; scipy's default
 
 
 @checked

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, get_args, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,36 +34,18 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 Array = NDArray[np.float64]
 
 FORMAT = "template-control scenario 2"
-_LAYOUT = storage.Layout(
-    fields={
-        "time": "T",
-        "state": "T 4",
-        "node": "T <nodes",
-        "toes": "T 2",
-        "stiffness": "T 2",
-        "foothold": "F 2",
-        "stride": "S <strides",
-        "section_time": "S+1",
-        "section_state": "S+1 3",
-        "wanted_speed": "S",
-        "target": "S 3",
-        "predicted": "S 3",
-        "controls": "S 6",
-        "residual": "S",
-        "reached": "S",
-        "solve_seconds": "S",
-    },
-    metadata={
-        **dict.fromkeys(("name", "map", "failure"), (str,)),
-        **dict.fromkeys(("nodes", "phases", "strides"), (list,)),
-        "parameters": (dict,),
-    },
-)
+_METADATA: dict[str, tuple[type, ...]] = {
+    **dict.fromkeys(("name", "map", "failure"), (str,)),
+    **dict.fromkeys(("nodes", "phases", "strides"), (list,)),
+    "parameters": (dict,),
+}
 
 
 @dataclass(frozen=True)
 class ScenarioRecord:
     """A simulated scenario; T samples, S strides, F footholds; SI units, y up.
+
+    Each field's annotation has its axes as of :class:`~template_control.storage.Layout`.
 
     Attributes:
         time: (T,) [s].
@@ -85,22 +67,22 @@ class ScenarioRecord:
         metadata: scenario, names of nodes and strides, how it ended.
     """
 
-    time: Array
-    state: Array
-    node: NDArray[np.int64]
-    toes: Array
-    stiffness: Array
-    foothold: Array
-    stride: NDArray[np.int64]
-    section_time: Array
-    section_state: Array
-    wanted_speed: Array
-    target: Array
-    predicted: Array
-    controls: Array
-    residual: Array
-    reached: NDArray[np.bool_]
-    solve_seconds: Array
+    time: Annotated[Array, "T"]
+    state: Annotated[Array, "T 4"]
+    node: Annotated[NDArray[np.int64], "T <nodes"]
+    toes: Annotated[Array, "T 2"]
+    stiffness: Annotated[Array, "T 2"]
+    foothold: Annotated[Array, "F 2"]
+    stride: Annotated[NDArray[np.int64], "S <strides"]
+    section_time: Annotated[Array, "S+1"]
+    section_state: Annotated[Array, "S+1 3"]
+    wanted_speed: Annotated[Array, "S"]
+    target: Annotated[Array, "S 3"]
+    predicted: Annotated[Array, "S 3"]
+    controls: Annotated[Array, "S 6"]
+    residual: Annotated[Array, "S"]
+    reached: Annotated[NDArray[np.bool_], "S"]
+    solve_seconds: Annotated[Array, "S"]
     metadata: dict[str, Any]
 
     def __repr__(self) -> str:
@@ -162,7 +144,9 @@ class ScenarioRecord:
     @checked
     def load(cls, path: str | Path) -> ScenarioRecord:
         """Read it; see :func:`~template_control.storage.load`."""
-        return storage.load(cls, path, FORMAT, _LAYOUT)
+        hints = get_type_hints(cls, include_extras=True)
+        sizes = {name: get_args(hint)[1] for name, hint in hints.items() if name != "metadata"}
+        return storage.load(cls, path, FORMAT, storage.Layout(sizes, _METADATA))
 
 
 _SAMPLES = 40  # a stride
@@ -188,7 +172,7 @@ class _Log:
     def note(self, now: float, goal: StrideGoal, solution: StepSolution, stride: Stride) -> None:
         """Append a stride that began at ``now``."""
         times = np.linspace(0.0, stride.duration, _SAMPLES, endpoint=False)
-        row = np.clip(np.searchsorted(stride.meta[:, 0], times, side="right") - 1, 0, None)
+        row = stride.rows(times)
         self.samples.append(
             np.column_stack(
                 (now + times, stride.sample(times)[:, :4], stride.meta[row][:, [2, 3, 4, 5, 6]])
@@ -252,8 +236,10 @@ def simulate_scenario(
     Raises:
         ScenarioError: if a target of the profile is beyond any stride, or no segment moves.
     """
-    scenario = _in_motion(scenario)
-    p = scenario.parameters
+    moving = scenario.in_motion()
+    if moving is None:
+        raise ScenarioError("the template cannot stand: give the scenario a segment that walks")
+    scenario, p = moving, moving.parameters
     route, controllers, simulator = (
         ScenarioRoute(scenario),
         _Controllers(scenario),
@@ -291,13 +277,6 @@ def simulate_scenario(
             break
         section = section_of(AUTOMATON.sections(start)[1])
     return _record(scenario, log, failure)
-
-
-def _in_motion(scenario: Scenario) -> Scenario:
-    moving = scenario.in_motion()
-    if moving is None:
-        raise ScenarioError("the template cannot stand: give the scenario a segment that walks")
-    return moving
 
 
 def _padded(states: list[Array]) -> Array:

@@ -255,9 +255,7 @@ def load_scenario(path: str | Path) -> Scenario:
 
 
 @checked
-def example_one(
-    map_kind: MapKind = MapKind.PAPER, steps_after: int = 20, acceleration: float = 1.05
-) -> Scenario:
+def example_one(map_kind: MapKind = MapKind.PAPER, acceleration: float = 1.05) -> Scenario:
     """The paper's Example I (Section V-A): walk, run up to 5 m/s and down again, walk.
 
     It starts at the VLO speed that is 1.17 m/s on average, as Section V-A has it (Table IV
@@ -265,7 +263,6 @@ def example_one(
 
     Args:
         map_kind: return map of the controllers.
-        steps_after: walking steps at the end.
         acceleration: of the run, and its negative [m/s^2].
     """
     return Scenario(
@@ -274,7 +271,7 @@ def example_one(
             Segment("run", speed=1.9, acceleration=acceleration, until_speed=5.0),
             Segment("run", duration=1.5),
             Segment("run", acceleration=-acceleration, until_speed=2.0),
-            Segment("walk", speed=1.1, steps=steps_after),
+            Segment("walk", speed=1.1, steps=20),
         ),
         map_kind=map_kind,
         start=(1.125, 0.98, 0.0),

@@ -205,6 +205,7 @@ class _Body:
         return np.array([left, right, right + up, left + up])
 
 
+_DPI = 100
 _MOST_GIF_FRAMES = 1000  # a GIF is held in memory until its last frame
 
 
@@ -213,9 +214,8 @@ def write_film(
     playback: Playback,
     fps: float,
     progress: Callable[[int], None] | None = None,
-    dpi: int = 100,
 ) -> Path:
-    """Draw every frame into a ``.gif`` or ``.mp4``, 6.4 x 4.4 inches at ``dpi``.
+    """Draw every frame into a ``.gif`` or ``.mp4``, 640 x 440 dots large.
 
     ``fps`` is that with which the frames were chosen; ``progress`` gets the number of frames done.
     A RecordError if the ending is another, ffmpeg is missing, or the file cannot be written.
@@ -224,7 +224,7 @@ def write_film(
     with atomic_path(path) as place:
         stage = Stage(playback)
         try:
-            with writer.saving(stage.figure, str(place), dpi):
+            with writer.saving(stage.figure, str(place), _DPI):
                 for frame in range(len(playback.rows)):
                     stage.show(frame)
                     writer.grab_frame()

@@ -22,12 +22,16 @@ from template_control.slip.similarity import (
     SPEED,
     TIME,
     Scale,
-    dimensions_of,
     scaled,
     tuned,
 )
 
 TUNINGS = (EmbeddingOptions(), LqrOptions(), ModifiedOptions())
+
+
+def dimensions_of(options):
+    """By field; those without any are left out."""
+    return {f.name: f.metadata["dimension"] for f in fields(options) if "dimension" in f.metadata}
 
 
 def numbers(value):
