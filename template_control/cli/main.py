@@ -25,53 +25,35 @@ from template_control.cli.interrupts import (
 from template_control.cli.notices import notice, printed
 from template_control.errors import ParameterError, TemplateControlError, meant
 
-# By name the module with its ``add_options(parser)`` and ``run(options)``, after a colon the object
-# of the module that has them; and one line about it.
 _COMMANDS = {
-    "walk": (
-        "cli.motion:WALK",
-        "walk a robot that follows the SLIP template, headless, and report",
-    ),
-    "run": ("cli.motion:RUN", "run a robot that follows the SLIP template, headless, and report"),
-    "go": (
-        "cli.motion:GO",
-        "take a robot through a scenario of gaits and speeds, and the template alone too",
-    ),
-    "drive": ("cli.drive", "drive a robot in the browser: command, push and watch it"),
-    "robots": ("cli.robots", "list the shipped robots, with the template scaled to each"),
-    "replay": ("cli.replay", "show a recorded run in the browser, or write it as a page or a film"),
-    "plots": ("cli.plots", "draw the figures of a recorded run"),
-    "robustness": (
-        "cli.robustness",
-        "raise one disturbance after another until a robot's walk fails",
-    ),
-    "campaign": (
-        "cli.campaign",
-        "disturb a robot by everything at once, many times, and measure the share of falls",
-    ),
-    "study": ("cli.study", "run an experiment over a grid or a sample of some of its keys"),
-    "slip": ("cli.slip", "simulate the SLIP template through a scenario of gaits and speeds"),
-    "gaits": ("cli.gaits", "follow a branch of periodic gaits and their stability"),
-    "automaton": (
-        "cli.automaton",
-        "show the hybrid automaton that simulator, planners and robot controller read",
-    ),
-    "keys": (
-        "cli.keys",
-        "list all keys of an experiment's file, each of which is an option of walk, run and go",
-    ),
-    "warm-up": (
-        "cli.warm_up",
-        "compile once what all commands call; each compiles what it needs without it",
-    ),
-    "completion": (
-        "cli.completion",
-        "print a script that completes words in a shell",
-    ),
-    "reproduce": (
-        "paper.command",
-        "reproduce a table or figure of the paper, with the paper's numbers",
-    ),
+    "walk": "walk a robot that follows the SLIP template, headless, and report",
+    "run": "run a robot that follows the SLIP template, headless, and report",
+    "go": "take a robot through a scenario of gaits and speeds, and the template alone too",
+    "drive": "drive a robot in the browser: command, push and watch it",
+    "robots": "list the shipped robots, with the template scaled to each",
+    "replay": "show a recorded run in the browser, or write it as a page or a film",
+    "plots": "draw the figures of a recorded run",
+    "robustness": "raise one disturbance after another until a robot's walk fails",
+    "campaign": "disturb a robot by everything at once, many times, and measure the share of falls",
+    "study": "run an experiment over a grid or a sample of some of its keys",
+    "slip": "simulate the SLIP template through a scenario of gaits and speeds",
+    "gaits": "follow a branch of periodic gaits and their stability",
+    "automaton": "show the hybrid automaton that simulator, planners and robot controller read",
+    "keys": "list all keys of an experiment's file, each of which is an option of walk, run and go",
+    "warm-up": "compile once what all commands call; each compiles what it needs without it",
+    "completion": "print a script that completes words in a shell",
+    "reproduce": "reproduce a table or figure of the paper, with the paper's numbers",
+}
+"""Commands, with a line about each."""
+
+# The module with a command's ``add_options(parser)`` and ``run(options)``, after a colon the object
+# of the module that has them; of the other commands the one of their name.
+_PLACES = {
+    "walk": "cli.motion:WALK",
+    "run": "cli.motion:RUN",
+    "go": "cli.motion:GO",
+    "warm-up": "cli.warm_up",
+    "reproduce": "paper.command",
 }
 _USER_ERROR = 2
 _STDOUT, _STDERR = 1, 2
@@ -146,10 +128,10 @@ def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action=_Version, nargs=0, help="print the version and exit")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
-    for name, (place, about) in _COMMANDS.items():
+    for name, about in _COMMANDS.items():
         sub_parser = commands.add_parser(name, help=about)
         if name in wanted:
-            module, _, part = place.partition(":")
+            module, _, part = _PLACES.get(name, f"cli.{name}").partition(":")
             found: Any = importlib.import_module(f"template_control.{module}")
             found = getattr(found, part) if part else found
             found.add_options(sub_parser)

@@ -10,13 +10,15 @@ from dataclasses import dataclass, field
 from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import ALL, SCENARIO
-from template_control.cli.go import NO_STANDS, print_route_table, summarise_route
 from template_control.cli.interrupts import INTERRUPTED
 from template_control.cli.report import (
+    NO_STANDS,
     Kept,
     add_output_options,
+    print_route_table,
     print_table,
     run_and_keep,
+    summarise_route,
 )
 from template_control.errors import ParameterError
 from template_control.run.experiment import Experiment, PreparedExperiment

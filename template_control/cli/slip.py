@@ -13,8 +13,7 @@ import numpy as np
 
 from template_control import view
 from template_control.checks import option_types as values
-from template_control.cli.go import NO_STANDS
-from template_control.cli.report import output_folder
+from template_control.cli.report import NO_STANDS, output_folder
 from template_control.run.summary import STRIDES
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario

@@ -11,7 +11,7 @@ from template_control.checks import option_types as values
 from template_control.cli.trial_options import Report, add_trial_options, report_trials
 from template_control.sweep.study import Study, run_study
 from template_control.sweep.sweep import SweepResult
-from template_control.view.study_figure import study_figure
+from template_control.view.trial_figures import study_figure
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:

@@ -10,5 +10,5 @@ from .scenario_figures import save_scenario_figures as save_scenario_figures
 from .stability_figures import basin_figure as basin_figure
 from .stability_figures import branch_figure as branch_figure
 from .stability_figures import deadbeat_figure as deadbeat_figure
-from .study_figure import study_figure as study_figure
 from .style import Look as Look
+from .trial_figures import study_figure as study_figure

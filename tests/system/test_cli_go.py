@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from template_control.cli.go import print_route_table, summarise_route
 from template_control.cli.main import main
+from template_control.cli.report import print_route_table, summarise_route
 from template_control.run.record import Record
 from template_control.slip.scenario.run import ScenarioRecord
 

@@ -25,9 +25,8 @@ from template_control.run.record import Record
 from template_control.run.velocity import VelocityCommand, VelocityRange
 from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.view.browser import PORTS, show_in_browser
-from template_control.view.live.figures import Figures, Step
 from template_control.view.live.pace import Pace
-from template_control.view.live.page import Controls, Deeds, Plots, first_push
+from template_control.view.live.page import Controls, Deeds, Figures, Plots, Step, first_push
 from template_control.view.live.scene import LiveScene
 from template_control.view.live.server import PageServer
 from template_control.view.replay.playback import FRAME_RATES

@@ -1,16 +1,18 @@
-"""Controls and plots of a page on which a robot is driven."""
+"""Controls and plots of a page on which a robot is driven, and the figures that it plots."""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import radians
+from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.run.live import Tick
+from template_control.run.record import Record
 from template_control.run.velocity import VelocityRange
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
@@ -142,15 +144,9 @@ class Controls:
         d = self._deeds
         pace = self._slide("times real time", (0.05, 2.0), 1.0, 0.05)
         pace.on_update(lambda _: d.speed(float(pace.value)))
-        deeds = {
-            "pause": d.pause,
-            "tick": d.tick,
-            "step": d.step,
-            "reset": d.reset,
-            "save": d.save,
-        }
-        buttons = self._gui.add_button_group("run", tuple(deeds))
-        buttons.on_click(lambda _: deeds[buttons.value]())
+        deeds = ("pause", "tick", "step", "reset", "save")
+        buttons = self._gui.add_button_group("run", deeds)
+        buttons.on_click(lambda _: getattr(d, buttons.value)())
 
     def _add_keys(self) -> None:
         d = self._deeds
@@ -253,3 +249,58 @@ class Plots:
             last = first + len(plot.lines)
             handle.data = (columns[0], *columns[first:last])
             first = last
+
+
+Columns = Mapping[str, Array]
+
+
+class Figures:
+    """Torques and forces of some ticks; ``record`` is of the run so far."""
+
+    def __init__(self, record: Record) -> None:
+        self._weight = record.weight
+        self._limit = np.asarray(record.torque_limit)
+        legs = record.legs
+        self._joints = [[i for foot in group for i in legs[foot]] for group in record.groups]
+
+    def of(self, columns: Columns) -> tuple[float, float, float, float]:
+        """Figures of some ticks, whose ``columns`` are of :meth:`~.Recorder.latest`.
+
+        Returns:
+            Largest torque over its limit in each template leg, and mean vertical force of the
+            ground and of the template over the weight.
+        """
+        share = np.abs(columns["torque"]).max(axis=0) / self._limit
+        left, right = (float(share[joints].max()) for joints in self._joints)
+        ground = columns["contact_force"][..., 1].sum(axis=1).mean() / self._weight
+        template = columns["template_force"][..., 1].sum(axis=1).mean() / self._weight
+        return left, right, float(ground), float(template)
+
+
+@dataclass(frozen=True)
+class Step:
+    """Mean speed of the last step.
+
+    Attributes:
+        number: steps that are done.
+        speed: of the last one, along the heading [m/s].
+        began: when the present step was seen first [s], and x and y of the CoM then [m]; None
+            where no step was seen to begin.
+    """
+
+    number: int
+    speed: float
+    began: tuple[float, float, float] | None
+
+    def after(self, tick: Tick, columns: Columns) -> Step:
+        """The same after some more ticks, of which ``tick`` and the ``columns`` end the last."""
+        if tick.steps == self.number:
+            return self
+        com = columns["space_com" if "space_com" in columns else "com"][-1]
+        x, y = float(com[0]), float(com[1]) if len(com) > 2 else 0.0
+        speed, heading = self.speed, float(columns["heading"][-1])
+        if self.began is not None and tick.time > self.began[0]:
+            time, x_before, y_before = self.began
+            ahead = cos(heading) * (x - x_before) + sin(heading) * (y - y_before)
+            speed = ahead / (tick.time - time)
+        return Step(tick.steps, speed, (tick.time, x, y))

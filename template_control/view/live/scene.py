@@ -8,6 +8,7 @@ moves backward past it.
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, sin
 from typing import Any
@@ -18,11 +19,11 @@ from matplotlib.colors import to_rgb
 from numpy.typing import NDArray
 
 from template_control.plant.terrain import Terrain
+from template_control.robot.biped import leg_means
 from template_control.run.record import FloatingRecord, Record
-from template_control.view.live.frame import Body, Frame
-from template_control.view.replay.playback import spring
+from template_control.view.replay.playback import CARRYING, force_arrows, spring
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals
-from template_control.view.replay.scene import plates, raised, smoothed, turned_to
+from template_control.view.replay.scene import plates, points, raised, smoothed, strip, turned_to
 from template_control.view.style import COM, TEMPLATE, feet_shown
 
 Array = NDArray[np.float64]
@@ -40,6 +41,74 @@ _PLANAR_EYE, _FLOATING_EYE, _VIEW = (1.6, -9.0, 1.0), (4.5, -7.5, 2.6), 0.24
 _MIDDLE = 0.62  # of l0: height of the middle of the picture, at the least
 _SHOWN = 0.53  # of the robot's height: size of a picture that has 0.07 of it to spare
 _NONE = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A moment of a run; x forward or as the world's, y to the left, z up [m].
+
+    Attributes:
+        q: (nq,) configuration.
+        heading: of a floating-base robot [rad].
+        com: (3,) of the robot.
+        template: (3,) of the template.
+        toes: (2, 3) of its rear and front leg.
+        loaded: (2,) whether these push.
+        foot: (n, 3) of each.
+        stands: (n,) whether the ground carries it.
+        arrow: (n, 3) the ground's force on it, drawn.
+    """
+
+    q: Array
+    heading: float
+    com: Array
+    template: Array
+    toes: Array
+    loaded: NDArray[np.bool_]
+    foot: Array
+    stands: NDArray[np.bool_]
+    arrow: Array
+
+
+@dataclass(frozen=True)
+class Body:
+    """What all frames of a run have in common.
+
+    Attributes:
+        groups: contacts of each template leg.
+        sides: (n,) how far to the left a planar robot's feet are [m].
+        weight: [N].
+        length: the template's rest length [m].
+    """
+
+    groups: tuple[tuple[int, ...], ...]
+    sides: Array
+    weight: float
+    length: float
+
+    @classmethod
+    def of(cls, record: Record, sides: Array) -> Body:
+        """That of a recorded run."""
+        return cls(record.groups, sides, record.weight, float(record.template.rest_length))
+
+    def frame(self, columns: Mapping[str, Any]) -> Frame:
+        """The last of some ticks; ``columns`` are of :meth:`~.recorder.Recorder.latest`."""
+        last = {name: values[-1:] for name, values in columns.items()}
+        com, template, toes, foot, force = (found[0] for found in points(last, self.sides))
+        rear = int(last["rear"][0])
+        stands = last["contact_force"][0, :, 1] > CARRYING * self.weight
+        pushes = np.linalg.norm(last["template_force"][0], axis=1) > CARRYING * self.weight
+        return Frame(
+            q=last["q"][0],
+            heading=float(last["heading"][0]),
+            com=com,
+            template=template,
+            toes=leg_means(toes, [self.groups[leg] for leg in (rear, 1 - rear)]),
+            loaded=pushes,
+            foot=foot,
+            stands=stands,
+            arrow=force_arrows(force, stands, self.weight, self.length),
+        )
 
 
 @dataclass(frozen=True)
@@ -264,18 +333,9 @@ class LiveScene:
         self._place = x, y
         line = np.array(self._terrain.line(x - _SEEN * length, x + _SEEN * length))
         wide = _SEEN * length if self._floating else 1.5 * length
-        edges = [np.insert(line, 1, y + side, axis=1) for side in (-wide, wide)]
-        count = np.arange(len(line) - 1)
-        near = np.stack((count, count + 1, count + len(line)), axis=1)
-        far = near[:, [1, 1, 2]] + [0, len(line), 0]
         how = {"side": "double", "cast_shadow": False}
-        self._scene.add_mesh_simple(
-            "/world/ground",
-            np.concatenate(edges),
-            np.concatenate((near, far)),
-            color=_rgb(_GROUND),
-            **how,
-        )
+        surface = strip(line, (y - wide, y + wide))
+        self._scene.add_mesh_simple("/world/ground", *surface, color=_rgb(_GROUND), **how)
         # A line every rest length shows that the camera travels.
         first, last = np.ceil(line[[0, -1], 0] / length)
         lines = np.arange(first, last) * length
@@ -309,8 +369,9 @@ def _rgb(color: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _arrow(sides: int = 10) -> tuple[Array, NDArray[np.int64]]:
+def _arrow() -> tuple[Array, NDArray[np.int64]]:
     """Vertices and faces of an arrow one metre long, straight up."""
+    sides = 10
     turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)
     ring = np.stack((np.cos(turn), np.sin(turn), 0.0 * turn), axis=1)
     shaft, head = 0.06 * ring, 0.15 * ring

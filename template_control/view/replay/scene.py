@@ -59,13 +59,19 @@ def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tupl
         thick = 0.02 * length
         place[:3, 3] = 0.5 * (low + high), 0.5 * (right + left), level - 0.5 * thick
         return mg.Box([high - low, left - right, thick]), place
-    count = len(line)
-    edges = [np.column_stack((line[:, 0], np.full(count, y), line[:, 1])) for y in sides]
-    first = np.arange(count - 1)
+    return mg.TriangularMeshGeometry(*strip(line, sides)), place
+
+
+def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+    """A surface across a line: vertices (2 N, 3) and faces (2 N - 2, 3).
+
+    Arguments as for :func:`ground_shape`.
+    """
+    count, first = len(line), np.arange(len(line) - 1)
+    edges = [np.insert(line, 1, y, axis=1) for y in sides]
     near = np.column_stack((first, first + 1, first + count))
     far = np.column_stack((first + 1, first + count + 1, first + count))
-    surface = mg.TriangularMeshGeometry(np.concatenate(edges), np.concatenate((near, far)))
-    return surface, place
+    return np.concatenate(edges), np.concatenate((near, far))
 
 
 def smoothed(ground: Terrain, x: Array, length: float) -> Array:

@@ -14,11 +14,9 @@ from chromium import CHROMIUM, NONE_HERE, Chromium, until
 
 import template_control as tc
 from template_control.errors import ParameterError
-from template_control.view.live.figures import Figures, Step
-from template_control.view.live.frame import Body
 from template_control.view.live.pace import Pace
-from template_control.view.live.page import first_push
-from template_control.view.live.scene import LiveScene
+from template_control.view.live.page import Figures, Step, first_push
+from template_control.view.live.scene import Body, LiveScene
 from template_control.view.live.server import PageServer, is_own
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals, model_of
 from template_control.view.replay.scene import in_space
