@@ -6,7 +6,6 @@ import ast
 import hashlib
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 from template_control.robot.biped import Biped
 
@@ -39,25 +38,20 @@ def _code(package: Path) -> str:
         digest.update(str(place).encode())
         content = path.read_bytes()
         if path.suffix == ".py":
-            digest.update(ast.dump(_without_docstrings(ast.parse(content))).encode())
+            digest.update(ast.dump(_without_texts(content)).encode())
         else:
             digest.update(content)
     return digest.hexdigest()
 
 
-def _without_docstrings(tree: Any) -> Any:
-    """The tree, in place, without statements that are texts."""
-    for name in ("body", "orelse", "finalbody", "handlers", "cases"):
-        statements = getattr(tree, name, None)
-        if isinstance(statements, list):
-            kept = [_without_docstrings(s) for s in statements if not _is_text(s)]
-            setattr(tree, name, kept or [ast.copy_location(ast.Pass(), s) for s in statements[:1]])
+def _without_texts(source: bytes) -> ast.Module:
+    """A module's tree without statements that are texts, such as docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            body[:] = [s for s in body if not (isinstance(s, ast.Expr) and _is_text(s.value))]
     return tree
 
 
-def _is_text(statement: ast.AST) -> bool:
-    return (
-        isinstance(statement, ast.Expr)
-        and isinstance(statement.value, ast.Constant)
-        and isinstance(statement.value.value, str)
-    )
+def _is_text(value: ast.expr) -> bool:
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)

@@ -69,25 +69,6 @@ def completed_strides(record: Record) -> dict[str, int]:
     return {names.get(kind, kind): count for kind, count in kinds.items()}
 
 
-def _flight_share(record: Record) -> dict[str, float | None]:
-    """Share of the time without a foot on the ground, of the robot and of its gait."""
-    touching = record.contact_force[:, :, 1] > 0.0
-    return {
-        "robot": float(np.mean(~touching.any(axis=1))),
-        "template": record.gait_flight_share,
-    }
-
-
-def _duty_factor(record: Record) -> float:
-    """Share of the time that a foot is on the ground, mean of both."""
-    return float(np.mean(record.contact_force[:, :, 1] > 0.0))
-
-
-def _cost_of_transport(record: Record, walked: float) -> float | None:
-    """Work of the joints, positive and negative alike, over m g and distance."""
-    return record.summary.joint_work / (record.weight * walked) if walked > 0.0 else None
-
-
 def _speed_error(record: Record) -> float | None:
     """Root mean square of dx/dt at the sections less what the stride was to end in [m/s]."""
     error = record.section_state[1:, 0] - record.section_target[:-1, 0]
@@ -159,6 +140,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
     counted: dict[str, Any] = asdict(record.summary)
     del counted["joint_work"]
     walked = float(record.com[-1, 0] - record.com[0, 0])
+    touching = record.contact_force[:, :, 1] > 0.0
     return {
         "robot": record.robot_name,
         "gait": record.gait_name,
@@ -174,9 +156,14 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "nearest_speed_taken": _nearest(record),
         **counted,
         "qp_failed_share": record.summary.qp_failures / max(len(record.tick_seconds), 1),
-        "cost_of_transport": _cost_of_transport(record, walked),
-        "flight_share": _flight_share(record),
-        "duty_factor": _duty_factor(record),
+        "cost_of_transport": record.summary.joint_work / (record.weight * walked)
+        if walked > 0.0
+        else None,
+        "flight_share": {
+            "robot": float(np.mean(~touching.any(axis=1))),
+            "template": record.gait_flight_share,
+        },
+        "duty_factor": float(np.mean(touching)),
         "control_tick_seconds": _quantiles(record.tick_seconds),
         "qp_solve_seconds": _solving(record.solve_seconds),
         "plan_seconds": _quantiles(record.plan_seconds),

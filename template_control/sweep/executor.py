@@ -11,7 +11,7 @@ import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -66,7 +66,7 @@ def run_calls(
     done: SimpleQueue[Future[Outcome]] = SimpleQueue()
     under_way: dict[Future[Outcome], int] = {}
     due = time.monotonic()
-    with given_or_own(executor) as pool:
+    with workers() if executor is None else nullcontext(executor) as pool:
         try:
             while True:
                 for index, arguments in islice(calls, in_flight - len(under_way)):
@@ -162,16 +162,6 @@ def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
     if not isinstance(pool, _Workers):
         for future in under_way:
             future.cancel()
-
-
-@contextmanager
-def given_or_own(executor: Executor | None) -> Iterator[Executor]:
-    """The user's executor, or a pool of our own that ends with the sweep."""
-    if executor is not None:
-        yield executor
-        return
-    with workers() as own:
-        yield own
 
 
 @contextmanager

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Iterable
 from concurrent.futures import FIRST_EXCEPTION, Executor, wait
+from contextlib import nullcontext
 from dataclasses import replace
 from functools import lru_cache
 
@@ -16,7 +17,7 @@ from template_control.run.experiment import Experiment
 from template_control.run.live import COMPILED
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.sweep.executor import given_or_own
+from template_control.sweep.executor import workers
 from template_control.warm_up import ready
 
 _ROBOTS = 8  # that a worker keeps
@@ -48,7 +49,7 @@ def simulate_many(
     for experiment in rows:
         settings.to_table(experiment)  # refuses what only this process has
     ready(COMPILED)
-    with given_or_own(executor) as pool:
+    with workers() if executor is None else nullcontext(executor) as pool:
         under_way = [pool.submit(run_experiment, experiment) for experiment in rows]
         done, waiting = wait(under_way, return_when=FIRST_EXCEPTION)
         for future in waiting:
