@@ -73,11 +73,6 @@ class RunningGait:
         """Step length over step duration [m/s]."""
         return self.step_length / self.step_duration
 
-    @property
-    def energy(self) -> float:
-        """Mechanical energy [J]."""
-        return float(APEX.energy(self.parameters, self.apex))
-
 
 @checked
 def running_speeds(parameters: SlipParameters) -> tuple[float, float]:
