@@ -260,7 +260,8 @@ def solve_stride(
     problem = StrideProblem(
         stride=stride,
         aim=aim,
-        weights=weights,
+        # Another layout would be compiled anew, in the middle of a run.
+        weights=np.ascontiguousarray(weights),
         controls=u,
         slots=slots,
         base=prior.base,
