@@ -126,6 +126,7 @@ LATERAL = np.dtype(
         ("half_width", _F),  # how far to either side of its middle a foot bears; 0 of a point [m]
         # -- the foothold: see Placement --
         ("step", _F),  # to it in the gait, see LateralAim [m]
+        ("steps", _F, (2,)),  # the gait's, from either foot, see LateralAim [m]
         ("second_step", _F),  # from it to the one after it, to the left [m]
         ("hold", _F),  # time before touchdown from which on it is kept [s]
         ("placed", _I),  # whether there is one
@@ -296,7 +297,7 @@ class LateralPlanner:
         if self._lateral.ahead and not turned:
             self._aim = before_turn(self._aim, self._lateral, self.wish.turn)
         self.data["second_step"] = self.cycle.steps[stance.other.row]
-        self.data["step"] = self._aim.step
+        self.data["step"], self.data["steps"] = self._aim.step, self._aim.steps
 
     def forecast(self, path: TemplatePath, com: Array, feet: Array) -> LateralForecast:
         """Forecast of the next foothold, where the planar path of the robot begins.
