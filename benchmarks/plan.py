@@ -3,10 +3,9 @@
 Run: python benchmarks/plan.py [--decisions 100] [--json plan.json]
 
 A plan at VLO is that of a walk with push-off near its gait, a plan at apex that of a run. The plan
-of several steps is made near one gait, each with the last one to begin with; and without one, to
-change the speed by 0.3 m/s, and after a push that has changed dx/dt and dy/dt by up to 0.1 m/s.
-Times are those of the thread: what else the machine does in between does not count, but a busy
-cache does.
+of several steps is made near one gait, to change the speed at VLO by 0.3 m/s, and after a push that
+has changed dx/dt and dy/dt by up to 0.1 m/s. Times are those of the thread: what else the machine
+does in between does not count, but a busy cache does.
 """
 
 from __future__ import annotations
@@ -60,7 +59,7 @@ def contexts(
         speed = rng.uniform(*speeds)
         z = state(speed)
         sign = 1.0 if rng.random() < 0.5 else -1.0
-        target = np.array([speed + sign * change, *z[1:]])
+        target = np.array([z[0] + sign * change, *z[1:]])
         yield Context(z + rng.uniform(-1.0, 1.0, len(z)) * off[: len(z)], target)
 
 

@@ -126,7 +126,7 @@ LATERAL = np.dtype(
         ("half_width", _F),  # how far to either side of its middle a foot bears; 0 of a point [m]
         # -- the foothold: see Placement --
         ("step", _F),  # to it in the gait, see LateralAim [m]
-        ("steps", _F, (2,)),  # the gait's, from either foot, see LateralAim [m]
+        ("steps", _F, (2,)),  # the least and the largest, to the left [m]
         ("second_step", _F),  # from it to the one after it, to the left [m]
         ("hold", _F),  # time before touchdown from which on it is kept [s]
         ("placed", _I),  # whether there is one
