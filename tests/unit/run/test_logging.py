@@ -82,6 +82,6 @@ def test_every_section_is_told(robot, default_gait, caplog):
 
 @pytest.mark.slow(seconds=2)
 def test_a_stride_that_the_template_cannot_make_is_told(robot, default_gait, caplog):
-    _, told = told_of(-90.0, robot, default_gait, caplog, catches=False)
+    _, told = told_of(120.0, robot, default_gait, caplog, catches=False)
     (refused,) = [m for m in told if "no stride of the template" in m.getMessage()]
     assert refused.levelno == logging.WARNING
