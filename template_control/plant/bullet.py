@@ -320,7 +320,7 @@ class BulletPlant(EnginePlant):
             v[i] = state[1]
 
     def _find_contacts(self) -> None:
-        """See :class:`~.engine.EnginePlant`.
+        """See :class:`EnginePlant`.
 
         Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
         all. Whatever touches the robot is ground: it does not collide with itself.

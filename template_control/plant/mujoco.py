@@ -130,7 +130,7 @@ class MujocoPlant(EnginePlant):
         q[:], v[:] = self.data.qpos[self._q], self.data.qvel[self._v]
 
     def _find_contacts(self) -> None:
-        """See :class:`~.engine.EnginePlant`."""
+        """See :class:`~.plant.bullet.EnginePlant`."""
         rows = self._forces.shape[1]
         axes, contacts = AXES[min(rows, UP + 1)], self.data.contact
         for i, shapes in enumerate(contacts.geom.tolist()):

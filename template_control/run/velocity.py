@@ -42,7 +42,7 @@ fell on its way down to 0.24 in 3 of 12 trials, at 0.2 as it turned, and at 0.16
 
 _SLOWEST_ON_SOLES = 0.15
 """The same of a robot on flat feet, where the family's slow gaits begin, with other legs and steps
-a quarter shorter. On its way down to them G1 fell, as it turned or went aside."""
+a quarter shorter. On its way down to them G1 fell, as it turned or went sideways."""
 
 _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of

@@ -210,7 +210,7 @@ def distance_aside(
 ) -> float:
     """Distance of a foothold to the side, with the capture point on the line between both feet [m].
 
-    Beside that line there is no ground to hold the CoM on. It is the gait's, the first of
+    There is no ground off that line to hold the CoM on. It is the gait's, the first of
     ``steps``, or the nearest for which, at touchdown, the capture point is as large a share of the
     step to the side as ahead,
 

@@ -181,11 +181,11 @@ def before_turn(aim: LateralAim, lateral: LateralGait, turn: float) -> LateralAi
         lateral: the gait's step map.
         turn: to the left [rad].
     """
-    aside = lateral.length * turn
+    to_left = lateral.length * turn
     return aim._replace(
         state=aim.state + np.array([lateral.ahead, lateral.speed]) * turn,
-        step=aim.step + aside,
-        steps=aim.steps + aside,
+        step=aim.step + to_left,
+        steps=aim.steps + to_left,
     )
 
 
