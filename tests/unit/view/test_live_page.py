@@ -258,7 +258,8 @@ def test_a_robot_is_driven_in_a_browser(tmp_path):
         page.run.hand.set_friction(0.02)
         until(lambda: page.run.ended, "it falls")
         until(lambda: "; reset begins anew" in tab.text(), "the page says so")
-        assert tab.text().count("Reset begins anew") == 1, "and notifies once"
+        notices = until(lambda: tab.text().count("Reset begins anew"), "and notifies")
+        assert notices == 1, "once"
         tab.click("button", "save")
         until(lambda: (tmp_path / "kept" / "run.toml").exists(), "it is saved")
         tab.click("button", "reset")
