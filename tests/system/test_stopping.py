@@ -54,7 +54,7 @@ def processor_time(pid):
 
 
 def children_time():
-    """[s] of processors that dead children of this process have used; no wait for a disk is in it."""
+    """[s] of processors that dead children of this process have used, without waits for a disk."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
