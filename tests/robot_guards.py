@@ -14,11 +14,14 @@ class RobotGuards:
         self.data = np.zeros(1, GUARDS)
         set_guards(self.data, parameters, options)
 
-    def fired(self, edge, sensed, due):
-        """Whether the edge's event has happened; the template's is due in so many seconds."""
+    def fired(self, edge, sensed, due, *, contact=(False, False), swing_time=(np.inf, np.inf)):
+        """Whether the edge's event has happened; the template's is due in so many seconds.
+
+        By foot: whether it touches the ground, and the time since it lifted off [s].
+        """
         state, feet = np.zeros(1, SENSED), np.zeros(1, FEET)
         state["state"], state["toes"] = sensed.state, sensed.toes
-        feet["roles"], feet["swing_time"] = sensed.feet, sensed.swing_time
+        feet["roles"], feet["swing_time"] = sensed.feet, swing_time
         number = int(edge.event), int(PLACED.get(edge.reset, -1))
-        contact = sensed.contact.astype(np.uint8)
-        return bool(fired(self.data[0], number, state[0], feet[0], contact, due))
+        stands = np.array(contact, dtype=np.uint8)
+        return bool(fired(self.data[0], number, state[0], feet[0], stands, due))

@@ -1,7 +1,7 @@
 """State of the contacts: flags of the sensors, checked against walls and the path.
 
 This is the only place where contact flags are judged. Everything in the controller that asks
-whether a foot stands reads :attr:`ContactMonitor.standing`.
+whether a foot stands reads ``standing`` of ``CONTACTS``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.robot.biped import SINGLE
 from template_control.robot.terms import LEGS, MOST_CONTACTS
-from template_control.slip.similarity import TIME, tuned
+from template_control.slip.similarity import TIME, Scale, tuned
 
 Array = NDArray[np.float64]
 
@@ -59,6 +59,9 @@ CONTACTS = np.dtype(
         ("least", _F),  # horizontal force that a wall has at least [N]
         ("doubt", _F),  # [s], of the options
         ("linger", _F),  # [s], of the options
+        ("early", _F),  # a touchdown is due from this long before its time on the path [s]
+        ("sinking", _F),  # a foot that comes down faster is not due [m/s]
+        ("settling", _F),  # a contact comes down to others of its foot as fast [m/s]
         ("expected", _I, (LEGS,)),  # by foot: IN_AIR, ON_GROUND or DUE
         ("contacts", _I),  # number of them
         ("foot", _I, (MOST_CONTACTS,)),  # that each contact is of
@@ -83,6 +86,11 @@ NO_FORCE: Array = np.zeros((0, 0))
 def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -> None:
     """Take in the flags of a tick.
 
+    A flag that says what the path expects of its foot is believed at once: a foot stands, is in the
+    air, or is due to land, where either flag is expected. Any other flag is believed after
+    ``ContactOptions.doubt``. A foot pressed against a wall does not stand; one of several contacts
+    stands on one of them.
+
     ``c``, of ``CONTACTS``, is overwritten but for ``expected``. ``flags`` (n,) say whether each
     contact touches anything, ``force`` (n, d) is on each, forward first and up last [N];
     ``NO_FORCE``: walls are not looked for. ``dt`` is since the last tick [s].
@@ -106,33 +114,27 @@ def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -
             c.standing[foot] = 1
 
 
-class ContactMonitor:
-    """Debounced state of the contacts; ``standing`` (2,) says which feet are on ground.
+def set_contacts(
+    data: Any,
+    options: ContactOptions,
+    weight: float,
+    scale: Scale,
+    groups: Sequence[Sequence[int]] = SINGLE,
+) -> None:
+    """Write the constants of a robot's contacts into ``data`` (1,), of ``CONTACTS``.
 
-    A flag that says what the path expects of its foot is believed at once: a foot stands, is in the
-    air, or is due to land, where either flag is expected. Any other flag is believed after
-    ``ContactOptions.doubt``. A foot pressed against a wall does not stand; one of several contacts
-    stands on one of them. ``weight`` is the robot's [N], ``groups`` are the contacts of either
-    foot; ``data`` (1,) are of ``CONTACTS``.
+    ``options`` are scaled; ``weight`` is the robot's [N], ``groups`` are the contacts of each foot.
     """
+    now = data[0]
+    now["contacts"] = sum(map(len, groups))
+    for foot, group in enumerate(groups):
+        now["foot"][list(group)] = foot
+    now["least"], now["doubt"], now["linger"] = _FORCE * weight, options.doubt, options.linger
+    now["early"], now["sinking"] = EARLY * scale.time, SINKING * scale.speed
+    now["settling"] = SETTLING * scale.speed
 
-    def __init__(
-        self,
-        options: ContactOptions,
-        weight: float,
-        data: Any,
-        groups: Sequence[Sequence[int]] = SINGLE,
-    ) -> None:
-        self.data = data
-        now = self.data[0]
-        now["contacts"] = sum(map(len, groups))
-        for foot, group in enumerate(groups):
-            now["foot"][list(group)] = foot
-        now["least"], now["doubt"], now["linger"] = _FORCE * weight, options.doubt, options.linger
-        self.standing: NDArray[np.bool_] = self.data["standing"][0].view(bool)
-        self.begin()
 
-    def begin(self) -> None:
-        """Forget an earlier run; no foot is said to stand yet."""
-        for name in ("standing", "touching", "wall", "flags", "held"):
-            self.data[name] = 0
+def forget_contacts(data: Any) -> None:
+    """Begin a run: no foot is said to stand yet."""
+    for name in ("standing", "touching", "wall", "flags", "held"):
+        data[name] = 0

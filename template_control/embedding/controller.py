@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.embedding.contacts import EARLY, NO_FORCE, SETTLING, SINKING, ContactMonitor
+from template_control.embedding.contacts import NO_FORCE, forget_contacts, set_contacts
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.motion import LateralMotion
 from template_control.embedding.free.options import FreeOptions, default_options
@@ -90,7 +90,6 @@ class EmbeddingController:
         feet: roles and swings of the feet.
         path_clock: the robot's place on that path, and the template there.
         learners: what is learnt from stride to stride.
-        contacts: which feet stand.
         slope: the ground's, by the footholds, uphill along the world's x.
         frame: axes that lean with the ground.
         observer: the robot's state in the template's terms.
@@ -131,10 +130,7 @@ class EmbeddingController:
         o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
         self._tick = tick = np.zeros(1, TICK)
-        now = tick[0]
-        now["early"], now["sinking"] = EARLY * scale.time, SINKING * scale.speed
-        now["settling"] = SETTLING * scale.speed
-        now["friction_margin"] = o.friction_margin
+        tick["friction_margin"] = o.friction_margin
         self.learners = Learners(o, self.parameters, robot, tick)
         self.slope = SlopeEstimate(self.parameters.rest_length)
         self.frame = SlopeFrame(robot, tick["frame"])
@@ -144,9 +140,8 @@ class EmbeddingController:
         com = self.references.com
         self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"], robot.half_length)
         weight = robot.mass * robot.gravity
-        self.contacts = ContactMonitor(o.contacts, weight, tick["contacts"], robot.groups)
-        standing = self.contacts.standing
-        self.observer = StateObserver(robot, self.feet, standing, com[4:], tick["sensed"])
+        set_contacts(tick["contacts"], o.contacts, weight, scale, robot.groups)
+        self.observer = StateObserver(robot, self.feet, com[4:], tick["sensed"])
         set_guards(tick["guards"], self.parameters, o.guards)
         check_legs(automaton, robot)
         self._modes = modes(automaton, robot.nv, o.phases)
@@ -244,7 +239,7 @@ class EmbeddingController:
         if not node.stance:
             # The liftoff before has made the foot that stood the front leg's.
             self.feet.landed = self.feet.foot_of_leg[Leg.FRONT]
-        self.contacts.begin()
+        forget_contacts(self._tick["contacts"])
         self._read()
         self._decide(section)
         self._slope_unknown = len(self.mode.stance) > 1 and self.frame.turns

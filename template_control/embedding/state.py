@@ -103,8 +103,6 @@ class TemplateState:
             phase says so, dx/dt includes the angular momentum about the CoM as if it moved the CoM,
             so that m y dx/dt - m x dy/dt is the robot's angular momentum about its stance foot.
         toes: (2,) x of the rear and the front foot [m].
-        contact: (2,) whether each foot touches the ground.
-        swing_time: (2,) time since each foot lifted off [s].
         feet: the foot that is the rear leg's, and the front leg's.
         acceleration: (2,) wanted of the CoM at the last tick [m/s^2]: what is planned anew goes on
             with it.
@@ -112,8 +110,6 @@ class TemplateState:
 
     state: Array = field(default_factory=lambda: np.zeros(4))
     toes: Array = field(default_factory=lambda: np.zeros(2))
-    contact: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(2, dtype=bool))
-    swing_time: Array = field(default_factory=lambda: np.full(2, np.inf))
     feet: tuple[int, int] = (0, 1)
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
 
@@ -121,9 +117,8 @@ class TemplateState:
 class StateObserver:
     """Observer of the robot's state on the template's ground, that of the foot that landed last.
 
-    Every tick updates the robot's model. Others write ``contact`` (2,), whether each foot touches
-    the ground, and ``acceleration`` (2,) wanted of the CoM [m/s^2]; ``data`` (1,) are of
-    ``SENSED``. ``now`` was read last; ``ground`` is the height of the
+    Every tick updates the robot's model. Others write ``acceleration`` (2,) wanted of the CoM
+    [m/s^2]; ``data`` (1,) are of ``SENSED``. ``now`` was read last; ``ground`` is the height of the
     template's ground [m], ``pre_impact_velocity`` (2,) dx/dt and dy/dt of this tick if nothing has
     hit the robot since the last one.
     """
@@ -131,20 +126,11 @@ class StateObserver:
     ground = Number("ground")
     _rear_shift = Number("rear_shift")
 
-    def __init__(
-        self,
-        robot: Biped,
-        feet: Feet,
-        contact: NDArray[np.bool_],
-        acceleration: Array,
-        data: Any,
-    ) -> None:
+    def __init__(self, robot: Biped, feet: Feet, acceleration: Array, data: Any) -> None:
         self._robot, self._feet, self.data = robot, feet, data
         self.now = TemplateState(
             state=self.data["state"][0],
             toes=self.data["toes"][0],
-            contact=contact,
-            swing_time=feet.swing_time,
             acceleration=acceleration,
         )
         self.pre_impact_velocity: Array = self.data["pre_impact_velocity"][0]

@@ -56,9 +56,6 @@ _F, _I = np.float64, np.int64
 TICK = np.dtype(
     [
         ("time", _F),  # since the start [s]
-        ("early", _F),  # a touchdown is due from this long before its time on the path [s]
-        ("sinking", _F),  # a foot that comes down faster is not due [m/s]
-        ("settling", _F),  # a contact comes down to others of its foot as fast [m/s]
         ("friction_margin", _F),  # share of the friction that the cones use
         ("trim", _F),  # acceleration that the momentum trim adds in its phases [m/s^2]
         ("frame", FRAME),
@@ -177,7 +174,7 @@ def _expect(t: Any, r: Any) -> None:
     if mode.next_touchdown_leg >= 0 and not t.path.without_touchdown:
         foot = t.feet.roles[mode.next_touchdown_leg]
         due = t.path.event_times[_TOUCHDOWN] - t.path.time
-        if due <= t.early and r.foot_velocity[foot, UP] >= -t.sinking:
+        if due <= c.early and r.foot_velocity[foot, UP] >= -c.sinking:
             c.expected[foot] = DUE
 
 
@@ -375,7 +372,7 @@ def _place_contacts(t: Any, r: Any, want: Any) -> None:
                 continue
             for axis in range(3):
                 reference = want.side[foot] if axis == 1 else want.foot[foot, axis // 2]
-                down = -t.settling if axis == 2 else 0.0
+                down = -t.contacts.settling if axis == 2 else 0.0
                 away = want.offset[contact, axis]
                 away[0] = r.contact_position[contact, axis] - reference[0]
                 away[1], away[2] = down - reference[1], -reference[2]

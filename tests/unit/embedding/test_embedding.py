@@ -100,25 +100,19 @@ def test_template_forces_accelerate_the_template(gait):
 
 
 def test_guards_feel_what_the_template_sees():
-    sensed = TemplateState(
-        np.array([0.0, 0.97, 1.1, 0.0]),
-        np.array([0.0, 0.6]),
-        np.array([True, True]),
-        np.array([np.inf, 1.0]),
-    )
-    guards = RobotGuards(P, GuardOptions())
+    sensed = TemplateState(np.array([0.0, 0.97, 1.1, 0.0]), np.array([0.0, 0.6]))
+    guards, stand = RobotGuards(P, GuardOptions()), (True, True)
 
-    def happened(event, due=np.inf):
+    def happened(event, due=np.inf, swung=1.0):
         edges = [e for node in AUTOMATON.nodes for e in node.edges if e.event is event]
-        return guards.fired(edges[0], sensed, due)
+        return guards.fired(edges[0], sensed, due, contact=stand, swing_time=(np.inf, swung))
 
     assert happened(Event.VLO)
     assert happened(Event.TOUCHDOWN)
     assert not happened(Event.VIRTUAL_BOTTOM)
     assert not happened(Event.REAR_LIFTOFF)
     assert happened(Event.REAR_LIFTOFF, due=-0.01)
-    sensed.swing_time[1] = 0.01
-    assert not happened(Event.TOUCHDOWN), "the foot that just left may still scrape"
+    assert not happened(Event.TOUCHDOWN, swung=0.01), "the foot that just left may still scrape"
     sensed.state[0] = -0.01
     assert not happened(Event.VLO)
     sensed.state[:2] = 0.5, 0.95
@@ -130,10 +124,9 @@ def test_touchdown_is_the_placed_leg_s():
     walking = AUTOMATON.start("w").edge(Event.TOUCHDOWN)
     running = AUTOMATON.start("r").edge(Event.TOUCHDOWN)
     for leg, edge, other in ((0, running, walking), (1, walking, running)):
-        contact = np.array([leg == 0, leg == 1])
-        sensed = TemplateState(contact=contact, toes=np.array([0.3, 0.3]))
-        assert guards.fired(edge, sensed, np.inf)
-        assert not guards.fired(other, sensed, np.inf)
+        contact, sensed = (leg == 0, leg == 1), TemplateState(toes=np.array([0.3, 0.3]))
+        assert guards.fired(edge, sensed, np.inf, contact=contact)
+        assert not guards.fired(other, sensed, np.inf, contact=contact)
 
 
 def test_load_learns_a_constant_and_ignores_the_gait():

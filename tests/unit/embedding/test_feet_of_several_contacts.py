@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from contact_flags import take_in
 
-from template_control.embedding.contacts import CONTACTS, ContactMonitor, ContactOptions
+from template_control.embedding.contacts import CONTACTS, ContactOptions, set_contacts
 from template_control.embedding.free.options import FreeOptions, TrotOptions, default_options
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.swing import FEET, spread_contacts
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 from template_control.whole_body.task import References
 
 PAIRS = ((0, 3), (1, 2))
@@ -24,19 +26,16 @@ def flags(*touching):
 
 
 def test_a_foot_stands_on_one_of_its_contacts():
-    monitor = ContactMonitor(ContactOptions(doubt=0.004), 100.0, np.zeros(1, CONTACTS), PAIRS)
-    take_in(monitor, flags(3), None, (None, False), DT)
-    assert monitor.standing.tolist() == [True, False]
-    assert monitor.data["touching"][0, :4].tolist() == [0, 0, 0, 1]
-    take_in(monitor, flags(0, 3), None, (True, False), DT)
-    assert monitor.data["touching"][0, :4].tolist() == [1, 0, 0, 1]
+    contacts, scale = np.zeros(1, CONTACTS), Scale.of(SlipParameters())
+    set_contacts(contacts, ContactOptions(doubt=0.004), 100.0, scale, PAIRS)
+    assert take_in(contacts, flags(3), None, (None, False), DT).tolist() == [True, False]
+    assert contacts["touching"][0, :4].tolist() == [0, 0, 0, 1]
+    take_in(contacts, flags(0, 3), None, (True, False), DT)
+    assert contacts["touching"][0, :4].tolist() == [1, 0, 0, 1]
     # One that nobody expects is doubted; a foot that leaves has to leave with all of them.
-    take_in(monitor, flags(0, 2, 3), None, (True, False), DT)
-    assert monitor.standing.tolist() == [True, False]
-    take_in(monitor, flags(3), None, (False, False), DT)
-    assert monitor.standing.tolist() == [True, False]
-    take_in(monitor, flags(), None, (False, False), DT)
-    assert monitor.standing.tolist() == [False, False]
+    assert take_in(contacts, flags(0, 2, 3), None, (True, False), DT).tolist() == [True, False]
+    assert take_in(contacts, flags(3), None, (False, False), DT).tolist() == [True, False]
+    assert take_in(contacts, flags(), None, (False, False), DT).tolist() == [False, False]
 
 
 def offsets(swung, yaw=0.0):
