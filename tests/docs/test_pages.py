@@ -107,7 +107,7 @@ def test_every_picture_is_shown():
     assert set((DOCS / "images").iterdir()) == shown
 
 
-@pytest.mark.slow
+@pytest.mark.slow(seconds=14)
 @pytest.mark.parametrize("page", RUN)
 def test_a_page_runs_as_printed_from_top_to_bottom(page, tmp_path, run_block):
     (tmp_path / "examples").symlink_to(EXAMPLES)

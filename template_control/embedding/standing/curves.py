@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
-from template_control.embedding.com_path import TERMS, Quintic, quintics
 from template_control.robot.start import Pose
+from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial, quintic
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import STAND_HEIGHT
 from template_control.slip.similarity import LENGTH, TIME, Scale, scaled, tuned
@@ -91,7 +91,6 @@ def standing_pose(
 
 
 _SAMPLES = 20  # of a curve, its start not counted
-_TERMS = 6
 _LIGHTEST = 0.05  # of the weight: legs do not pull
 
 
@@ -127,7 +126,7 @@ def best_quintic(
     coefficients, constant term first. Also returns the numbers of the end and of the duration.
     """
     best, least, chosen, lasting = np.inf, np.inf, 0, 0
-    c = np.empty((2, _TERMS))
+    c = np.empty((2, TERMS))
     for i in range(durations.shape[0]):
         t = durations[i]
         time = rules.pace * (t + rules.calm * rules.calm / t)
@@ -136,14 +135,7 @@ def best_quintic(
                 if time >= best:
                     continue
                 for axis in range(2):
-                    p, v, a = starts[s, axis, 0], starts[s, axis, 1], starts[s, axis, 2]
-                    d = ends[e, axis, 0] - p - v * t - 0.5 * a * t * t
-                    w = (ends[e, axis, 1] - v - a * t) * t
-                    h = (ends[e, axis, 2] - a) * t * t
-                    c[axis, 0], c[axis, 1], c[axis, 2] = p, v, 0.5 * a
-                    c[axis, 3] = (10.0 * d - 4.0 * w + 0.5 * h) / t**3
-                    c[axis, 4] = (-15.0 * d + 7.0 * w - h) / t**4
-                    c[axis, 5] = (6.0 * d - 3.0 * w + 0.5 * h) / t**5
+                    quintic(starts[s, axis], ends[e, axis], t, c[axis])
                 excess = 0.0
                 for k in range(_SAMPLES + 1):
                     excess = max(excess, _excess(c, t * k / _SAMPLES, rules))
@@ -153,7 +145,7 @@ def best_quintic(
                 if cost < best:
                     best, least, chosen, lasting = cost, excess, e, i
                     for axis in range(2):
-                        for n in range(_TERMS):  # Numba compiles whole copies for seconds
+                        for n in range(TERMS):  # Numba compiles whole copies for seconds
                             curve[axis, n] = c[axis, n]
     return best, least, chosen, lasting
 
@@ -162,9 +154,9 @@ def best_quintic(
 def _excess(c: Array, t: float, rules: Rules) -> float:
     """By how far a curve leaves the feet, or the legs' reach, at a time [m]."""
     x = y = ax = ay = 0.0
-    for n in range(_TERMS - 1, -1, -1):
+    for n in range(TERMS - 1, -1, -1):
         x, y = x * t + c[0, n], y * t + c[1, n]
-    for n in range(_TERMS - 1, 1, -1):
+    for n in range(TERMS - 1, 1, -1):
         ax, ay = ax * t + n * (n - 1) * c[0, n], ay * t + n * (n - 1) * c[1, n]
     across, along = rules.gravity
     p = x - y * (ax + along) / max(across + ay, _LIGHTEST * across)
@@ -174,10 +166,11 @@ def _excess(c: Array, t: float, rules: Rules) -> float:
 
 
 def curves() -> None:
-    """The search, called to compile it."""
+    """The search, and a curve's value, called to compile them."""
     states = np.ones((1, 2, 3))
     rules = Rules(0.0, 1.0, (9.81, 0.0), 1.0, 0.0, 1.0, 1.0)
-    best_quintic(states, states, np.ones(1), rules, np.empty((2, _TERMS)))
+    best_quintic(states, states, np.ones(1), rules, np.empty((2, TERMS)))
+    polynomial(np.ones(TERMS), 1.0)
 
 
 STAND = (Part(curves, 0.5),)
@@ -339,8 +332,8 @@ class BetweenFeet:
         room = 0.5 * min(abs(end - toe) for toe in self.toes) + self.options.slack
         height = self.options.height / self.parameters.gravity
         time = max(np.sqrt(_PEAK * abs(end - start) * height / room), self._durations[0])
-        curve = quintics(self.at_rest(start), self.at_rest(end), np.array(time))
-        return Found((Quintic(curve, float(time)),), 0.0, self._pace * float(time))
+        curve = Quintic.between(self.at_rest(start), self.at_rest(end), float(time))
+        return Found((curve,), 0.0, self._pace * float(time))
 
     def _joined(self, first: Found, second: Found) -> Found:
         return Found(

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.embedding.com_path import TERMS, Quintic, chained, timed_stride
 from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
 from template_control.embedding.standing.curves import (
     PLACE,
@@ -38,6 +37,7 @@ from template_control.embedding.standing.passes import (
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
+from template_control.slip.dynamics.timed import TERMS, Quintic, chained, timed_stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
 from template_control.slip.parameters import SlipParameters

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.slip.dynamics.timed import TERMS, polynomial, quintic
 from template_control.warm_up import Part
 
 Array = NDArray[np.float64]
@@ -202,7 +203,6 @@ class Ground(NamedTuple):
 
 
 _LIGHTEST = 0.05  # of the weight: legs do not pull
-_TERMS = 6
 
 
 @compiled
@@ -219,7 +219,7 @@ def best_pressure(
     """
     n = p.shape[0]
     best, least, chosen, lasting = np.inf, np.inf, 0, 0
-    rise, low, high = np.empty(_TERMS), np.empty(n), np.empty(n)
+    rise, low, high = np.empty(TERMS), np.empty(n), np.empty(n)
     wish, lasts, rate, found = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for i in range(durations.shape[0]):
         t = durations[i]
@@ -227,11 +227,11 @@ def best_pressure(
         if time >= best:
             continue
         for e in range(ends.shape[0]):
-            _quintic(start[1], ends[e, 1], t, rise)
+            quintic(start[1], ends[e, 1], t, rise)
             goal = ground.front if ground.unloading > 0.0 else ends[e, 0, 0]
             for k in range(n):
                 lasts[k] = t / n
-                y, _, lift = _at(rise, (k + 0.5) * t / n)
+                y, _, lift = polynomial(rise, (k + 0.5) * t / n)
                 lift = max(ground.gravity + lift, _LIGHTEST * ground.gravity)
                 rate[k] = np.sqrt(lift / max(y, _LIGHTEST * ground.reach))
                 wish[k], left = goal, 1.0
@@ -248,7 +248,7 @@ def best_pressure(
             x, v = start[0, 0], start[0, 1]
             for k in range(n):
                 x, v = _after(x, v, rate[k], found[k], lasts[k])
-                y, _, _ = _at(rise, (k + 1) * t / n)
+                y, _, _ = polynomial(rise, (k + 1) * t / n)
                 away = max(x - ground.rear, ground.front - x)
                 excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
             cost = max(excess - ground.slack, 0.0) + time
@@ -266,34 +266,12 @@ def _after(x: float, v: float, w: float, p: float, dt: float) -> tuple[float, fl
     return p + c * (x - p) + s / w * v, w * s * (x - p) + c * v
 
 
-@compiled
-def _quintic(start: Array, end: Array, t: float, c: Array) -> None:
-    """Write the coefficients (6,) of the quintic of a duration [s], constant term first."""
-    p, v, a = start[0], start[1], start[2]
-    d = end[0] - p - v * t - 0.5 * a * t * t
-    w, h = (end[1] - v - a * t) * t, (end[2] - a) * t * t
-    c[0], c[1], c[2] = p, v, 0.5 * a
-    c[3] = (10.0 * d - 4.0 * w + 0.5 * h) / t**3
-    c[4] = (-15.0 * d + 7.0 * w - h) / t**4
-    c[5] = (6.0 * d - 3.0 * w + 0.5 * h) / t**5
-
-
-@compiled
-def _at(c: Array, t: float) -> tuple[float, float, float]:
-    """Value of a polynomial, and its first two derivatives."""
-    p = d = dd = 0.0
-    for n in range(c.shape[0] - 1, -1, -1):
-        dd = dd * t + d
-        d = d * t + p
-        p = p * t + c[n]
-    return p, d, 2.0 * dd
-
-
 def plans() -> None:
-    """A plan, made to compile it."""
+    """A plan, and a curve's value, made to compile them."""
     states, one = np.ones((1, 2, 3)), np.ones(2)
     ground = Ground._make((0.0, 1.0, 0.0, 1.0, 9.81, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE))
     best_pressure(states[0], states, one, ground, False, one.copy(), one.copy())
+    polynomial(one, 1.0)
 
 
 PRESSURE = (Part(plans, 6.5),)

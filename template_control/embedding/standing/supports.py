@@ -13,7 +13,6 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from template_control.embedding.com_path import TERMS, Quintic, derivatives, quintics
 from template_control.embedding.standing.curves import PLACE, BetweenFeet, Found
 from template_control.embedding.standing.pressure import (
     ARRIVE,
@@ -21,6 +20,7 @@ from template_control.embedding.standing.pressure import (
     Ground,
     best_pressure,
 )
+from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
@@ -99,7 +99,7 @@ def _curve(
     start: Array, end: Array, duration: float, pressures: Array, rates: Array
 ) -> tuple[Quintic, ...]:
     """The curve of a duration [s] over centres of pressure (n,) [m], w (n,) being ``rates``."""
-    rise = quintics(start, end, np.array(duration))[1]
+    rise = Quintic.between(start, end, duration).coefficients[1]
     (x, v), dt, time = start[0, :2], duration / len(rates), 0.0
     found = []
     for p, w in zip(pressures, rates, strict=True):
@@ -108,7 +108,7 @@ def _curve(
             c[0, n] = (v if n % 2 else x - p) * w ** (n - n % 2) / factorial(n)
         c[0, 0], c[1] = x, _from(rise, time)
         found.append(Quintic(c, dt))
-        x, v = derivatives(c[0], np.array(dt))[:2]
+        x, v, _ = polynomial(c[0], dt)
         time += dt
     return tuple(found)
 

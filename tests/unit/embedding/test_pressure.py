@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from template_control.embedding.com_path import derivatives
 from template_control.embedding.standing.curves import StandingOptions
 from template_control.embedding.standing.pressure import Pieces, bounded, pressure
 from template_control.embedding.standing.supports import OverFeet
+from template_control.slip.dynamics.timed import polynomial
 from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
@@ -74,7 +74,7 @@ def samples(found):
     rows, begun = [], 0.0
     for piece in found.pieces:
         for t in np.linspace(0.0, piece.duration, 5):
-            (x, _, ddx), (y, _, ddy) = derivatives(piece.coefficients, np.array(t))
+            (x, _, ddx), (y, _, ddy) = (polynomial(c, t) for c in piece.coefficients)
             rows.append((begun + t, x, y, x - y * ddx / (G + ddy)))
         begun += piece.duration
     return np.array(rows).T

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.com_path import derivatives, leg_forces, quintics
+from template_control.embedding.com_path import leg_forces
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
@@ -17,6 +17,7 @@ from template_control.run.options import Push
 from template_control.slip import Event, Slot, walking_gait
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import StrideKind
+from template_control.slip.dynamics.timed import Quintic, polynomial
 from template_control.slip.gaits.walking_by_speed import speed_range
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.scenario.route import SteadyRoute
@@ -55,14 +56,11 @@ def outside(p, toes):
 
 def test_a_quintic_begins_and_ends_as_told():
     draw = np.random.default_rng(0)
-    start, ends, durations = (
-        draw.normal(size=(2, 3)),
-        draw.normal(size=(5, 2, 3)),
-        draw.uniform(1, 2, 5),
-    )
-    found = quintics(start, ends, durations)
-    np.testing.assert_allclose(derivatives(found, np.zeros((5, 1))), np.tile(start, (5, 1, 1)))
-    np.testing.assert_allclose(derivatives(found, durations[:, None]), ends, atol=1e-12)
+    for duration in draw.uniform(1, 2, 5):
+        start, end = draw.normal(size=(2, 2, 3))
+        found = Quintic.between(start, end, duration)
+        np.testing.assert_allclose([polynomial(c, 0.0) for c in found.coefficients], start)
+        np.testing.assert_allclose(found.end(), end, atol=1e-12)
 
 
 def test_a_com_on_the_ground_loads_no_foot():
