@@ -15,7 +15,7 @@ def test_it_has_ten_cells_without_outputs():
     assert not any(cell.get("outputs") for cell in CELLS)
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=8)
 def test_the_paper_in_ten_cells(capsys):
     names = {}
     for source in CODE:

@@ -27,7 +27,7 @@ def blocks(language, text=README):
     return re.findall(rf"```{language}\n(.*?)```", text, flags=re.DOTALL)
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_python_snippets_run_as_printed(run_block):
     snippets = blocks("python")
     assert snippets
@@ -135,7 +135,7 @@ def test_other_commands_run_as_printed(line, tmp_path, walked, monkeypatch, capf
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=11)
 def test_the_replay_page_runs_as_printed(tmp_path, run_block, on_path):
     lines = [line for block in blocks("sh", REPLAY) for line in block.strip().splitlines()]
     assert lines[0].startswith("template-control walk")

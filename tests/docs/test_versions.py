@@ -12,7 +12,7 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 AUTHOR = ("-c", "user.name=a", "-c", "user.email=a@b")
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_every_release_has_its_site(tmp_path):
     pytest.importorskip("furo")
     clone, site = tmp_path / "clone", tmp_path / "site"

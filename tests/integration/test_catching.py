@@ -212,7 +212,7 @@ def kinds(record):
     return record.kinds_of_stride[:-1]
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("name", "phase"), [("runner", 0.3), ("five-link", 0.7)])
 def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
     robot = tc.load_robot(name)
@@ -260,7 +260,7 @@ def test_a_walk_of_a_scenario_runs_and_walks_on():
     assert set(kinds(fallen)) == {"w"}
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_the_command_says_no_and_counts_strides(tmp_path, capsys):
     arguments = ["walk", "--push", "60@2:0.4", "--steps", "5", "--no-figures", "--json"]
     assert main([*arguments, "--output", str(tmp_path / "caught")]) == 0

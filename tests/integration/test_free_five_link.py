@@ -229,7 +229,7 @@ def test_a_mistake_gives_its_message(message, load):
         MISTAKES[message](load)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 def test_it_walks_within_all_its_limits():
     robot = load_floating_robot("five-link-3d")
     gait = tc.robot_gait_for_speed(robot, 1.0)
@@ -271,7 +271,7 @@ def with_yaw(text, above):
     return text
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("above", [True, False])
 @pytest.mark.parametrize("plant", [PlantOptions(), MujocoOptions()])
 def test_legs_of_four_hinges_walk(load, text, above, plant):

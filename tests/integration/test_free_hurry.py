@@ -77,7 +77,7 @@ def test_an_outlook_is_what_the_bounds_leave():
     assert seen.price == pytest.approx(3.0 * left[0] ** 2 + 5.0 * left[1] ** 2)
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 def test_a_push_towards_the_foot_that_lands_is_taken():
     """10 N s at 80 kg to the right, as the right foot lands: the left one would have to cross."""
     robot = tc.load_floating_robot("five-link-3d")

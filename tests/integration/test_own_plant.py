@@ -41,7 +41,7 @@ class Wrapped:
         self.closed = True
 
 
-@pytest.mark.slow(seconds=11)
+@pytest.mark.slow(seconds=4)
 def test_a_plant_of_ones_own_is_the_same_world(robot, default_gait, tmp_path):
     mine = Wrapped(robot)
     planner = tc.LqrPlanner(default_gait)

@@ -167,7 +167,7 @@ def test_slip_command(tmp_path, capfd):
 
 
 # About so many seconds on two cores.
-LONG = {"fig12": 30, "fig8": 10, "fig13": 8, "fig9": 8, "fig10": 3, "fig5": 3}
+LONG = {"fig12": 14, "fig8": 5, "fig13": 5, "fig9": 4, "fig10": 3, "fig5": 3}
 # What is enough here. The planners that are missing walk in the tests of the README's commands.
 LESS = {
     "fig8": {"energies": np.array([824.0, 826.0])},
@@ -177,7 +177,7 @@ LESS = {
 }
 
 
-@pytest.mark.slow(seconds=30)
+@pytest.mark.slow(seconds=6)
 def test_example_one_on_a_robot(tmp_path, capfd):
     asked = ["reproduce", "fig10", "--robot", "runner", "--output", str(tmp_path), "--json"]
     assert main(asked) == 0

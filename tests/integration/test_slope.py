@@ -298,7 +298,7 @@ def walked(gait, ground, steps):
     )
 
 
-@pytest.mark.slow(seconds=25)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("slope", STEEP)
 def test_a_slope_is_walked_at_the_speed_of_level_ground(default_gait, slope):
     ground = tc.Terrain.slope(slope, start=default_gait.parameters.rest_length)
@@ -310,7 +310,7 @@ def test_a_slope_is_walked_at_the_speed_of_level_ground(default_gait, slope):
     assert record.section_nominal[-4:].all()
 
 
-@pytest.mark.slow(seconds=25)
+@pytest.mark.slow(seconds=4)
 def test_treads_that_fell_the_robot_before_are_walked(default_gait):
     """Its foothold heights are drawn from +-2 cm; with stiffnesses alone it fell in step 19."""
     ground = tc.Terrain.random_steps(0.02, (0.3, 0.6), 1, start=1.0, end=25.0)

@@ -149,7 +149,7 @@ def strides(record):
     return record.kinds_of_stride[:-1]
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("phase", "caught"), [(0.3, ["ww"]), (0.6, ["sb", "sw"])])
 def test_a_robot_that_is_pushed_back_hard_walks_on(phase, caught):
     robot = tc.load_robot("five-link")

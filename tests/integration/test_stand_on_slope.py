@@ -130,14 +130,14 @@ def test_a_urdf_of_ones_own_starts_where_its_like_does(tmp_path):
     assert startable_slopes(tc.load_robot(own)) == startable_slopes(five)
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("robot", "degrees"), ENDS)
 def test_a_walk_starts_on_the_steepest_ground_of_its_robot(robot, degrees):
     record = walked(tc.PlantOptions, degrees, steps=16, robot=robot)
     assert not record.fell, record.fall_reason
 
 
-@pytest.mark.slow(seconds=30)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(
     ("plant", "degrees"),
     [

@@ -99,7 +99,7 @@ def test_light_legs_lift_their_feet_high_in_steady_walking(name, high):
     assert Swings.of(robot, SCALE, own).towards(walk) == own
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("place", "height"), [(3.935, 0.03), (3.083, -0.03), (5.851, -0.03)])
 def test_an_unseen_step_leaves_the_walk_at_its_speed(default_gait, place, height):
     """With the feet lower or with legs chosen by the end state alone the robot fell."""
@@ -118,7 +118,7 @@ def test_an_unseen_step_leaves_the_walk_at_its_speed(default_gait, place, height
     assert record.section_state[-2:, 0] == pytest.approx(gait.state[0], rel=0.03)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("place", [3.01, 3.91, 3.995])
 def test_a_step_up_right_before_a_foothold_is_climbed(default_gait, place):
     """The foot came down in front of the wall, or lifted off right behind it."""

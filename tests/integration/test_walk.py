@@ -163,7 +163,7 @@ def test_bad_options_are_named():
         Experiment(record_every=0)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=5)
 def test_a_hundred_steps_settle_on_the_default_gait(default_gait):
     record = walk(default_gait, steps=100, record_every=10)
     figures = summarise(record, "")

@@ -185,7 +185,7 @@ def test_a_run_has_a_figure_of_its_apexes_and_a_walk_has_none(record, short_walk
     assert "apex_return" not in figures_of(first), "two apexes must follow each other"
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_figures_of_a_run_are_not_empty(record, tmp_path):
     for path in save_figures(record, tmp_path):
         picture = imread(path)[..., :3]

@@ -77,7 +77,7 @@ def test_a_planar_robot_is_not_pushed_aside(refused, robot, gait):
         )
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_a_push_aside_is_taken_and_recorded(bolt):
     """10 N s to the left at 80 kg: the robot steps there, and walks on beside its old path."""
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(bolt, 0.55), tc.embedding.FREE_PLANNER)

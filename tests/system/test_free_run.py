@@ -22,7 +22,7 @@ def settled(record):
     return record.time > record.section_time[6]
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(
     ("name", "speed"), [("five-link-3d", 2.0), ("runner-3d", 4.0), ("bolt", 1.2)]
 )
@@ -38,7 +38,7 @@ def test_it_runs_straight_at_its_speed(name, speed):
     assert record.solved.all()
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_a_push_from_the_side_is_run_off():
     push = Push(20.0, step=6, phase=0.3, direction=0.5 * np.pi)
     record = run("five-link-3d", 2.5, 18, pushes=(push,))
@@ -46,7 +46,7 @@ def test_a_push_from_the_side_is_run_off():
     np.testing.assert_allclose(record.section_state[-3:, 0], 2.5, rtol=0.02)
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_a_turn_is_leant_into():
     record = run("five-link-3d", 2.0, 26, course=tc.HeadingCommand(turning_rate=0.6))
     assert not record.fell, record.fall_reason
@@ -57,7 +57,7 @@ def test_a_turn_is_leant_into():
     assert record.summary.saturated_share < 0.01
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 def test_it_walks_runs_and_walks():
     robot = tc.load_floating_robot("five-link-3d")
     scenario = load_scenario(EXAMPLES / "walk_run_walk.toml")

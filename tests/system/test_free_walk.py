@@ -35,7 +35,7 @@ def straight():
     return walked()
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_bolt_walks_free(straight):
     record, gait = straight
     assert not record.fell, record.fall_reason
@@ -58,7 +58,7 @@ def test_bolt_walks_free(straight):
         assert angle["lower"] < angle["least"] < angle["most"] < angle["upper"]
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 def test_bolt_walks_slowly_too():
     """It fell at step 18 while the search priced no controls, and trusted the closed form."""
     robot = load_floating_robot("bolt")
@@ -95,7 +95,7 @@ def test_a_record_is_read_as_it_was_written(straight, tmp_path):
     assert again.metadata == json.loads(json.dumps(record.metadata))
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_bolt_turns():
     """The heading turns at each section, and the path with it."""
     record, gait = walked(tc.HeadingCommand(turning_rate=0.25))
@@ -122,7 +122,7 @@ def test_the_command_line_tells_a_course(refused, understood):
     assert "--turn left: rate is 'left': give a number" in told
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 def test_bolt_changes_its_speed_on_command():
     robot = load_floating_robot("bolt")
     command = tc.SpeedProfile(times=(0.0, 1.0, 4.0), speeds=(0.5, 0.5, 0.65))
@@ -134,7 +134,7 @@ def test_bolt_changes_its_speed_on_command():
     assert np.abs(record.attitude[:, :2]).max() < 0.02
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_the_command_walks_free(tmp_path, capfd):
     words = ["walk", "--robot", "bolt", "--free", "--steps", "4", "--turn", "0.2", "--json"]
     assert main([*words, "--output", str(tmp_path / "run")]) == 0

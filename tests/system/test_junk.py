@@ -55,7 +55,7 @@ def test_junk_for_public_functions(tmp_path_factory, data):
     one_call(data, tmp_path_factory.getbasetemp())
 
 
-@pytest.mark.slow(seconds=100)
+@pytest.mark.slow(seconds=4)
 @given(data=st.data())
 @settings(SHARE, max_examples=500)
 def test_much_junk_for_public_functions(tmp_path_factory, data):
@@ -96,7 +96,7 @@ def test_junk_for_commands(place, data):
     one_command(data, *place)
 
 
-@pytest.mark.slow(seconds=120)
+@pytest.mark.slow(seconds=5)
 @given(data=st.data())
 @settings(SHARE, max_examples=300)
 def test_much_junk_for_commands(place, data):

@@ -11,7 +11,7 @@ from template_control.run import VelocityProfile
 from template_control.run.summary import step_widths
 
 
-@pytest.mark.slow(seconds=14)
+@pytest.mark.slow(seconds=4)
 def test_five_link_stands_walks_runs_and_stands_again():
     record = tc.simulate(tc.Experiment.load(EXAMPLES / "zero_run_zero.toml"))
     assert not record.fell
@@ -22,7 +22,7 @@ def test_five_link_stands_walks_runs_and_stands_again():
     assert record.summary.qp_failures == 0
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_a_floating_base_walks_runs_and_walks_again():
     """It turns as it breaks into the run, and is then 2 mm next to the section decided at."""
     motion = VelocityProfile(
@@ -52,7 +52,7 @@ def test_go2_stands_trots_and_stands_again():
     assert record.summary.qp_failures == 0
 
 
-@pytest.mark.slow(seconds=14)
+@pytest.mark.slow(seconds=8)
 def test_g1_stands_runs_and_stands_again_in_mujoco():
     """With its feet as far apart as in the walk, it turns until it falls in the run."""
     given = tc.Experiment.load(EXAMPLES / "zero_run_zero.toml")

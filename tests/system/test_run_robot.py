@@ -169,7 +169,7 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(supervisor, gait, ear
     np.testing.assert_allclose(supervisor.path.section_state, [*gait.apex, 0.0], atol=0.03)
 
 
-@pytest.mark.slow(seconds=11)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("speed", [1.3, 2.0, 4.0])
 def test_robot_runs_at_other_speeds(speed):
     record = run(speed, 40)
@@ -195,7 +195,7 @@ def test_robot_runs_on_after_a_push(impulse, phase):
     assert np.max(np.abs(speed[18:] / 3.0 - 1.0)) < 0.02
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_runner_is_back_ten_steps_after_a_hard_push():
     pushes = (tc.Push(40.0, 6, 0.9), tc.Push(-40.0, 18, 0.0))
     record = run(3.0, 30, "runner", pushes=pushes)

@@ -10,7 +10,7 @@ import template_control as tc
 ENGINES = {"pybullet": tc.PlantOptions(), "mujoco": tc.MujocoOptions()}
 
 
-@pytest.mark.slow(seconds=18)
+@pytest.mark.slow(seconds=7)
 @pytest.mark.parametrize(
     ("example", "name", "engine", "top"),
     [
@@ -28,7 +28,7 @@ def test_a_robot_stands_runs_and_stands_again(example, name, engine, top):
     )
 
 
-@pytest.mark.slow(seconds=18)
+@pytest.mark.slow(seconds=7)
 def test_runner_stands_runs_and_stands_again_as_the_readme_prints_it(tmp_path, monkeypatch):
     check(go(ZERO_FIVE_ZERO, tmp_path, monkeypatch), 5.0)
 

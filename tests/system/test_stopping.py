@@ -206,7 +206,7 @@ def moments(seed):
     return [(*pair, float(at)) for pair, at in zip(pairs, moments, strict=True)]
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=5)
 @pytest.mark.parametrize(("name", "number", "at"), moments(seed=12))
 def test_a_command_stops_at_any_moment_and_spoils_nothing(tmp_path, short_walk, name, number, at):
     good = short_walk.save(tmp_path / "run.npz")

@@ -36,7 +36,7 @@ def check_trot(record, tilt=0.02):
     return load, pairs
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("name", "speed"), [("go2", 0.9), ("go2", 2.0), ("solo12", 0.8)])
 def test_a_running_trot_keeps_its_speed(name, speed):
     record = trot(name, "run", speed, 24)
@@ -47,7 +47,7 @@ def test_a_running_trot_keeps_its_speed(name, speed):
     assert (load.max(axis=1) == 0.0).mean() > 0.05, "it flies between the stances"
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_a_walking_trot_keeps_its_speed():
     record = trot("go2", "walk", 0.5, 16)
     load, _ = check_trot(record)
@@ -65,7 +65,7 @@ def test_it_trots_in_mujoco():
     np.testing.assert_allclose(record.section_state[-4:, 0], 1.5, rtol=0.02)
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("direction", [90.0, 225.0])
 def test_a_push_is_run_off(direction):
     # 40 N s on the reference template, a third of a metre per second.
@@ -76,7 +76,7 @@ def test_a_push_is_run_off(direction):
     assert abs(record.com_velocity[-1, 0]) > 1.0
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=4)
 def test_commands_show_a_trot(tmp_path, capsys):
     command = ["run", "--robot", "go2", "--floating-base", "--speed", "1.5", "--steps", "5"]
     assert main([*command, "--output", str(tmp_path)]) == 0
@@ -100,7 +100,7 @@ def going(*segments, **options):
     return tc.simulate(tc.Experiment(robot, motion=scenario, **options))
 
 
-@pytest.mark.slow(seconds=9)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("world", [PlantOptions(), MujocoOptions()], ids=["bullet", "mujoco"])
 def test_it_starts_trots_and_stops(world):
     stand = Segment("stand", duration=0.4)

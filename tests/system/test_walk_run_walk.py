@@ -40,7 +40,7 @@ def settled(record):
     assert np.all(np.abs(error[:, 1]) < 8e-3)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 def test_five_link_walks_runs_at_three_metres_a_second_and_walks():
     """On ground that is more slippery than the default's, as a push's test has that."""
     ground, known = tc.PlantOptions(friction=0.5), tc.EmbeddingOptions(friction=0.5)
@@ -74,7 +74,7 @@ SHORT = Scenario(
 )
 
 
-@pytest.mark.slow(seconds=14)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(
     "pushes",
     [
@@ -97,7 +97,7 @@ def test_five_link_holds_pushes_within_both_transitions(pushes):
     assert np.all(np.abs(record.section_state[-3:, 0] - 1.1) < 0.2)
 
 
-@pytest.mark.slow(seconds=14)
+@pytest.mark.slow(seconds=4)
 def test_five_link_holds_pushes_while_it_accelerates_and_decelerates():
     pushes = (tc.Push(-21.0, 14, 0.5), tc.Push(21.0, 34, 0.6))
     record = go("walk_run_walk.toml", "five-link", pushes=pushes)
@@ -114,7 +114,7 @@ def test_five_link_holds_pushes_while_it_accelerates_and_decelerates():
     settled(record)
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("off", [1e-6, 1e-4])
 def test_runner_goes_through_example_one_from_a_start_that_is_a_hair_off(off):
     # The first made a knee hit its stop, and fell; the other never came down from 2.7 m/s in time.
@@ -127,7 +127,7 @@ def test_runner_goes_through_example_one_from_a_start_that_is_a_hair_off(off):
     assert np.sqrt(np.mean(error**2)) < 0.15
 
 
-@pytest.mark.slow(seconds=25)
+@pytest.mark.slow(seconds=6)
 def test_runner_goes_through_example_one_as_its_template_does(tmp_path, monkeypatch):
     record = go_as_printed(EXAMPLE_ONE, tmp_path, monkeypatch)
     check(record)

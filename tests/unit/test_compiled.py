@@ -75,7 +75,7 @@ def test_a_caller_is_compiled_anew_when_what_it_calls_changes(package):
     assert call(package(2.0))[:2] == (2.0, 1)  # the first folder is still there
 
 
-@pytest.mark.slow(seconds=6)
+@pytest.mark.slow(seconds=5)
 def test_folders_of_old_sources_do_not_pile_up(package):
     for factor in range(5):
         value, _, path = call(package(float(factor)))

@@ -94,7 +94,7 @@ def result(locales, *arguments, program=RUN):
     return json.loads(done.stdout.splitlines()[-1])
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=5)
 def test_a_run_in_every_engine_has_the_same_bits_where_decimals_have_a_comma(locales, whole):
     point, comma = (result(locales, which, whole) for which in ("point", "comma"))
     assert (point.pop("before"), comma.pop("before")) == ("0.25", "0,25")

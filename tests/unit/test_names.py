@@ -45,7 +45,7 @@ def test_a_folder_s_name_is_printed_as_it_is(tmp_path, capsys):
     assert "[/b].png" in capsys.readouterr().out.replace("\n", "")
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 def test_names_are_drawn_as_they_are(short_walk, tmp_path):
     robot = tc.load_robot("runner")
     planner = tc.RunningPlanner(running_gait(tc.template_for(robot), 3.0))

@@ -118,7 +118,7 @@ def compiled_code(*lines):
     return found
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=11)
 def test_after_a_warm_up_no_command_compiles(tmp_path, monkeypatch):
     """What a command calls is what the warm-up has compiled, whatever else is in the cache."""
     monkeypatch.chdir(tmp_path)

@@ -147,7 +147,7 @@ def sliding_share(robot, gait, options):
     return float(slides[record.time > record.section_time[3]].any(axis=1).mean())
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=4)
 def test_a_walk_on_slippery_ground_slides_less_once_it_has_learnt(robot, default_gait):
     learns = sliding_share(robot, default_gait, EmbeddingOptions())
     deaf = EmbeddingOptions(slides=replace(OPTIONS, lowest=TOLD))

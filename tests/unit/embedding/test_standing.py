@@ -321,7 +321,7 @@ def test_the_robot_stands_still():
     assert record.solved.all()
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("spacing", "impulse"), [(0.3, 10.0), (0.3, -10.0), (0.1, 10.0)])
 def test_the_robot_takes_a_push_without_a_step(spacing, impulse):
     record = stand(spacing, impulse, 6)
@@ -341,7 +341,7 @@ def walked(spacing, speed):
     return tc.simulate(tc.Experiment(robot, scenario, pose=pose))
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("spacing", "speed"), [(0.1, 0.8), (0.3, 1.1)])
 def test_the_robot_stands_walks_and_stands(spacing, speed):
     record = walked(spacing, speed)

@@ -111,7 +111,7 @@ def test_in_the_air_the_foot_lands_where_the_com_comes_to_rest(planners):
 # ---- the robot
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("impulse", [22.0, -22.0])
 def test_a_robot_that_is_pushed_steps_and_stands(impulse):
     robot = tc.load_robot("five-link")
@@ -138,7 +138,7 @@ def test_a_robot_that_is_pushed_steps_and_stands(impulse):
     assert 0.2 < np.ptp(record.foot[-1, :, 0]) < 0.3
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_a_robot_walks_slowly_with_the_family_by_speed_and_closes_its_feet():
     robot = tc.load_robot("five-link")
     p = tc.template_for(robot)

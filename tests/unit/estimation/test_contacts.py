@@ -107,7 +107,7 @@ def flawed(steps, seed, embedding=None, share=0.02):
     )
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("seed", [1])
 def test_a_walk_bears_wrong_flags_by_doubting_them(robot, default_gait, seed):
     """Believed at once, one of them puts a foot down 6 cm over the ground."""
@@ -119,7 +119,7 @@ def test_a_walk_bears_wrong_flags_by_doubting_them(robot, default_gait, seed):
     assert record.section_state[-5:, 0] == pytest.approx(default_gait.vlo[0], rel=0.01)
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_an_undisturbed_walk_is_the_same_whatever_the_doubt(robot, default_gait):
     """All its touchdowns are due."""
     planner = tc.LqrPlanner(default_gait)
@@ -137,7 +137,7 @@ def test_an_undisturbed_walk_is_the_same_whatever_the_doubt(robot, default_gait)
     np.testing.assert_array_equal(walks[0].torque, walks[1].torque)
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("name", ["bolt", "five-link-3d"])
 def test_a_free_robot_bears_wrong_flags(name):
     robot = load_floating_robot(name)
@@ -154,7 +154,7 @@ def test_a_free_robot_bears_wrong_flags(name):
     assert not record.fell
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=5)
 def test_many_steps_with_two_flags_in_a_hundred_wrong(robot, default_gait):
     record = tc.simulate(replace(flawed(80, 0), robot=robot, planner=tc.LqrPlanner(default_gait)))
     assert not record.fell

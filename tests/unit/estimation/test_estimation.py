@@ -160,7 +160,7 @@ def test_noise_and_estimate_exclude_each_other(refused):
     assert build_parser(words).parse_args(words).estimate
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=5)
 def test_the_robot_walks_on_its_estimate(default_gait):
     robot = tc.load_robot("five-link")
     record = tc.simulate(

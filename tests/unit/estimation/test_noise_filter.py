@@ -106,7 +106,7 @@ def test_only_noise_is_filtered(bolt):
     assert isinstance(senses(bolt, noisy, replace(FreeOptions(), noise_filter=None)), Sensors)
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 def test_bolt_walks_with_noise_and_delay(bolt):
     gait = tc.robot_gait_for_speed(bolt, 0.55)
     noise = tc.SensorOptions(noise=1e-3, seed=1)

@@ -118,7 +118,7 @@ def test_a_damped_walk_is_the_undamped_one_by_other_torques(written):
     assert np.abs(damped.torque[:count] - plain.torque[:count]).max() > 50.0
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("options", [tc.PlantOptions(), tc.MujocoOptions(), tc.IdealOptions()])
 def test_losses_change_a_run_and_lossless_leaves_them_out_to_the_last_bit(written, options):
     path = written("five-link", 'damping="5" friction="2"', joints=r"\w*knee")

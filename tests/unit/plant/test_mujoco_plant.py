@@ -172,7 +172,7 @@ def test_the_command_walks_in_it_and_repeats_the_run(tmp_path, capsys):
     np.testing.assert_array_equal(records[0].q, records[1].q)
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("impulse", [-20.0, 20.0])
 def test_pushed_walks_go_on(robot, default_gait, impulse):
     push = tc.Push(impulse, 3, 0.25)
@@ -190,7 +190,7 @@ def test_pushed_walks_go_on(robot, default_gait, impulse):
     assert speed == pytest.approx(default_gait.vlo[0], rel=0.02)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 def test_a_scenario_of_walking_and_running_goes_through():
     """As ``runner`` goes through one to 5 m/s in test_stand_to_run.py."""
     scenario = tc.load_scenario(EXAMPLES / "walk_run_walk.toml")

@@ -159,7 +159,7 @@ def test_a_free_robot_in_other_words_falls_as_it_does(plant, seed, tmp_path):
     assert_same_fall(words, *FREE_PLANTS[plant], q, np.linspace(-0.1, 0.1, 12))
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize("plant", ["ideal", "pybullet"])
 @pytest.mark.parametrize("seed", range(2))
 def test_a_planar_robot_in_other_words_walks_the_same_steps(plant, seed, tmp_path):

@@ -229,7 +229,7 @@ def test_commands_of_the_page_are_understood(line, understood):
     assert understood(line).command == "campaign"
 
 
-@pytest.mark.slow(seconds=60)
+@pytest.mark.slow(seconds=7)
 def test_the_snippet_of_the_page_runs(capfd):
     (snippet,) = printed("python")
     exec(snippet, {})
@@ -245,7 +245,7 @@ def test_ctrl_c_says_where_the_trials_are(tmp_path, monkeypatch, capfd):
     assert "goes on from there" in capfd.readouterr().err
 
 
-@pytest.mark.slow(seconds=60)
+@pytest.mark.slow(seconds=4)
 def test_a_campaign_goes_on_and_its_falls_can_be_repeated(tmp_path, capfd):
     mix = tmp_path / "hard.toml"
     mix.write_text("push = [-160.0, -159.0]\nwithin = [1, 2]\nafter = 5\n")

@@ -302,7 +302,7 @@ def test_a_free_robot_is_pushed_aside_too():
     assert weak.torque_scale == 0.9
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_trials_of_a_free_robot():
     bolt = Experiment(RobotSpec("bolt", free=True), GaitSpec(speed=0.55))
     found = robustness.trial(settings.to_table(bolt), "noise", 1e-3, 0)

@@ -26,7 +26,7 @@ def brief(monkeypatch):
         monkeypatch.setattr(module, "AFTER", 7)
 
 
-@pytest.mark.slow(seconds=6)
+@pytest.mark.slow(seconds=5)
 @pytest.mark.usefixtures("brief")
 def test_json_figure_and_resumption(tmp_path, capfd):
     arguments = ["robustness", "--quick", "--disturbance", "delay", "--workers", "2", "--json"]
@@ -47,7 +47,7 @@ def test_json_figure_and_resumption(tmp_path, capfd):
     assert {path: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.usefixtures("brief")
 def test_a_run_is_disturbed_as_a_walk_is(tmp_path, capfd):
     words = ["robustness", "--gait", "run", "--quick", "--disturbance", "step-up", "--workers", "1"]
@@ -113,7 +113,7 @@ def test_a_robot_of_ones_own_is_understood_as_walk_understands_it(
     assert found[0].robot.locked == {"FL_HAA": 0.0}
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=6)
 @pytest.mark.usefixtures("brief")
 def test_a_shipped_robot_given_by_its_urdf_takes_as_much(tmp_path, capfd):
     words = ["--disturbance", "delay", "--quick", "--json", "--workers", "1"]
@@ -159,7 +159,7 @@ def test_the_snippet_of_the_documentation_runs(capfd):
     assert "fell: False" in capfd.readouterr().out
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=6)
 @pytest.mark.usefixtures("brief")
 def test_the_quick_command_of_the_documentation_runs(tmp_path, monkeypatch, capfd):
     others = {"--gait", "--floating-base", "--plant"}

@@ -97,7 +97,7 @@ def test_a_delay_is_scaled_with_the_robots_time():
     assert small.most == pytest.approx(240.0)
 
 
-@pytest.mark.slow(seconds=10)
+@pytest.mark.slow(seconds=4)
 def test_a_walk_that_reckons_with_its_delay_keeps_nearer_to_its_gait(default_gait):
     def off(options):
         planner = tc.LqrPlanner(default_gait)

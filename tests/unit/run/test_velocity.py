@@ -77,7 +77,7 @@ def test_a_robot_is_commanded_what_it_can():
     assert VelocityRange.of(tc.load_robot("rabbit")).gaits == ("stand", "walk")
 
 
-@pytest.mark.slow(seconds=12)
+@pytest.mark.slow(seconds=4)
 def test_five_link_3d_follows_its_velocities():
     velocities = ((0.0, 0.9, 0.0, 0.0), (3.0, 1.1, 0.1, 0.2), (10.0, 0.9, -0.1, -0.2))
     robot = tc.load_floating_robot("five-link-3d")

@@ -68,7 +68,7 @@ def test_margin_shrinks_towards_the_lower_limit():
     assert 0.0 < radii[0] < radii[1] < radii[2] < 0.05
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=4)
 def test_deadbeat_set_and_what_the_maps_make_of_it(paper_gait):
     found = backward_set(paper_gait, counts=(20, 120))
     assert len(found.state) > 200

@@ -245,7 +245,7 @@ def drawn(kind, random):
     return np.array([0.0, y, speed, rise]), controls(alpha, *stiffness)
 
 
-@pytest.mark.slow(seconds=20)
+@pytest.mark.slow(seconds=8)
 @pytest.mark.parametrize("draws", [300])
 def test_random_strides_end_as_they_do_by_dop853(draws):
     """Every kind of stride: outcome, number of events and the state where it ends or fails."""

@@ -156,7 +156,7 @@ def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys
     assert [c.keys() for c in made["chains"]] == [c.keys() for c in shipped["chains"]]
 
 
-@pytest.mark.slow(seconds=25)
+@pytest.mark.slow(seconds=4)
 def test_the_library_s_family_is_what_the_search_makes():
     made = map(family_search.chain_of, search_family())
     for new, shipped in zip(made, FAMILY.chains, strict=True):
@@ -164,7 +164,7 @@ def test_the_library_s_family_is_what_the_search_makes():
             np.testing.assert_allclose(getattr(new, name), getattr(shipped, name), rtol=1e-7)
 
 
-@pytest.mark.slow(seconds=15)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(
     # Near the gap of the family what human adds to a step costs 9 mm of height.
     ("name", "speed", "height"),
@@ -209,7 +209,7 @@ def test_light_legs_walk_at_all_speeds_and_weak_hips_at_fewer():
 ENDS = [("bolt", 0), ("rabbit", 0), ("rabbit", 1), ("human", 1)]
 
 
-@pytest.mark.slow(seconds=40)
+@pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("name", "end"), ENDS)
 def test_robots_walk_at_the_ends_of_their_ranges(name, end):
     robot = tc.load_robot(name)

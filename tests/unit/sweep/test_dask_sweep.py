@@ -19,7 +19,9 @@ from template_control.storage import to_jsonable
 from template_control.sweep import Study, run_study
 from template_control.sweep.sweep import grid
 
-pytestmark = pytest.mark.slow  # starting a cluster and its workers takes longest
+# Starting a cluster and its workers takes longest. Of several processes that run tests, one runs
+# all of these, and they share it.
+pytestmark = [pytest.mark.slow(seconds=12), pytest.mark.xdist_group("dask")]
 
 
 def fatal(x):

@@ -8,7 +8,7 @@ from template_control.errors import ParameterError, RobotError
 from template_control.sweep import workers
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_records_of_many_runs_are_those_of_single_runs():
     walks = [
         tc.Experiment(steps=1, world=tc.PlantOptions(friction=friction)) for friction in (0.5, 0.7)

@@ -52,7 +52,7 @@ def test_up_is_up_and_forward_is_to_the_right_in_the_film():
     assert up[0] > 0.9
 
 
-@pytest.mark.slow(seconds=8)
+@pytest.mark.slow(seconds=4)
 def test_the_template_is_where_its_toes_are(record):
     space = in_space(record, np.zeros(2))
     np.testing.assert_array_equal(space.com, record.space_com)

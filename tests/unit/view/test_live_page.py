@@ -207,7 +207,7 @@ def opens(tab, url, version):
     )
 
 
-@pytest.mark.slow(seconds=18)
+@pytest.mark.slow(seconds=15)
 @pytest.mark.skipif(CHROMIUM is None, reason=NONE_HERE)
 def test_a_robot_is_driven_in_a_browser(tmp_path):
     import viser
