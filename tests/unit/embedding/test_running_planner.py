@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.planners.planner import Context, Planner
+from template_control.embedding.planners.planner import Cause, Context, Planner
 from template_control.embedding.planners.running import (
     AGILE,
     OFFSET_GAIN,
@@ -94,6 +94,19 @@ def test_after_touchdown_only_the_stiffnesses_are_free(planner, gait):
     assert np.linalg.norm(decision.predicted[:2] - gait.apex) < 0.5 * np.linalg.norm(
         left - gait.apex
     )
+
+
+def test_a_foot_that_lands_changes_no_aim(planner, gait):
+    planner.decide(Context(gait.apex))
+    # As it lands, the legs' swing adds more to the speed than the pace is.
+    z, angle = gait.apex + [0.3, 0.0], gait.controls[Slot.TOUCHDOWN_ANGLE]
+    landed, pushed = (
+        planner.decide(Context(z, None, (angle, angle), cause))
+        for cause in (Cause.TOUCHDOWN, Cause.DEVIATION)
+    )
+    assert landed.nominal
+    assert not pushed.nominal
+    assert abs(landed.predicted[0] - gait.apex[0]) < abs(pushed.predicted[0] - gait.apex[0])
 
 
 def test_what_every_stride_adds_is_learnt(planner, gait):
