@@ -179,6 +179,7 @@ MODE = np.dtype(
         ("rolling_contact", _I),
         ("trim_momentum", _I),
         ("follow_curve", _I),
+        ("settles", _I),
         ("estimate_load", _I),  # and a task gives the feedback
         ("unloads", _I, (2,)),  # whether each leg has its normal force kept near the template's
         ("unloading", _F),  # time over which it gives its load up before it lifts off [s]; 0: none
@@ -223,7 +224,8 @@ def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool
     for i, edge in enumerate(edges):
         data["event"][i], data["placed"][i] = _numbered(edge)
     data["by_direction"] = control.clock is Clock.DIRECTION
-    for name in ("momentum_speed", "rolling_contact", "trim_momentum", "follow_curve"):
+    flags = ("momentum_speed", "rolling_contact", "trim_momentum", "follow_curve", "settles")
+    for name in flags:
         data[name] = getattr(control, name)
     data["estimate_load"] = control.estimate_load and tasks.follows_com
     data["unloads"][list(control.unload_legs)] = 1

@@ -57,6 +57,8 @@ class PhaseControl(Checked):
         use_pre_impact_velocity: whether the path from a touchdown begins with the velocity before
             the foot hit the ground. How much of the impact is over when it is felt varies from
             step to step; the template lands without one.
+        settles: whether a foot that is to stand, and does not touch the ground, bears nothing, and
+            its tasks bring it down; else it bears as if it touched.
     """
 
     tasks: tuple[Task, ...]
@@ -72,6 +74,7 @@ class PhaseControl(Checked):
     rolling_contact: bool = False
     use_pre_impact_velocity: bool = False
     follow_curve: bool = False
+    settles: bool = False
 
 
 Phases = Mapping[Phase | str, PhaseControl]

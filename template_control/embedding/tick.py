@@ -143,7 +143,7 @@ def stand(tick: Any, data: Any, references: Any, qp: Any) -> None:
     """Write which contacts the QP has on the ground; arguments: see the module.
 
     A foot stands on those of its contacts that touch the ground; one none of which does, as its
-    sensors say, on all of them.
+    sensors say, on all of them, or on none in a phase that settles it.
     """
     t, r, want, p = tick[0], data[0], references[0], qp[0]
     p.contacts = 0
@@ -151,7 +151,7 @@ def stand(tick: Any, data: Any, references: Any, qp: Any) -> None:
         want.stands[i] = 0
     for leg in range(t.mode.stances):
         foot = t.feet.roles[leg]
-        lifted = True
+        lifted = not t.mode.settles
         for i in range(r.members[foot]):
             lifted = lifted and not t.contacts.touching[r.group[foot, i]]
         for i in range(r.members[foot]):
@@ -356,7 +356,7 @@ def _turn(t: Any, want: Any, dt: float) -> None:
 def _place_contacts(t: Any, r: Any, want: Any) -> None:
     """Write where the contacts of a foot with several are to be, from the foot's reference.
 
-    Those of a foot that stands on others come straight down.
+    Those that do not touch, of a foot that stands, come straight down.
     """
     f, mode = t.feet, t.mode
     for i in range(mode.swings):

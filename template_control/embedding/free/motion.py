@@ -265,6 +265,7 @@ class LateralMotion:
         """A foot begins its swing."""
         speed = float(self.robot.data[0]["foot_velocity"][foot, _SIDE])
         self._references.side[foot] = self.side(foot), speed, 0.0
+        self._references.offset[list(self.robot.groups[foot])] = 0.0
 
     def plan(self, supervisor: StrideSupervisor) -> tuple[LateralPath, LateralAim]:
         """Plan of :func:`.lateral_foothold` on the supervisor's path."""

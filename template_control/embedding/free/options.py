@@ -68,17 +68,19 @@ _POINT_DOUBLE = PhaseControl(
     unload_legs=(Leg.REAR,),
 )
 
+_FEET = tuple(task(leg) for leg in Leg for task in (FootTask, SideFootTask))
+
 _POINT_RUNNING = PhaseControl(
     # As in the plane, about all three axes.
     tasks=(
         ComTask((0.01, 10.0)),
         SpinTask(),
-        FootTask(),
-        SideFootTask(),
+        *_FEET,
         SpareJointTask(),
     ),
     swings=(Leg.FRONT,),
     swing=RUNNING_SWING,
+    settles=True,
 )
 
 _POINT_SINGLE = PhaseControl(
@@ -97,7 +99,7 @@ FREE_PHASES: Phases = {
     **running_phases(
         (
             OrientationTask((0.01, 0.01, 0.001)),
-            *(task(leg) for leg in Leg for task in (FootTask, SideFootTask)),
+            *_FEET,
             SpareJointTask(),
         ),
         _POINT_RUNNING,
@@ -133,8 +135,9 @@ _SOLE_RUNNING = PhaseControl(
     # half of the stance, and the angular momentum that is left costs a fifth of the speed.
     tasks=(
         ComTask((0.01, 10.0), _SOLE_GAINS),
-        # As fast as on point feet, a change of the speed turns the trunk until it falls.
-        SpinTask(bandwidth=35.0),
+        # As fast as on point feet, in either way, a change of the speed turns the trunk until it
+        # falls.
+        SpinTask(bandwidth=35.0, turning=(0.26, 0.26, 0.2)),
         FootTask(),
         SideFootTask(),
         SoleTask(),
@@ -187,7 +190,7 @@ _PAIR_STANCE = PhaseControl(
 # The ground's force has no moment about the line between two feet, which is oblique: feedback that
 # moves x alone moves y too. A walk without push-off has no other means to keep its speed.
 _PAIR_SWAYING = replace(_PAIR_STANCE, tasks=(*_PAIR_STANCE.tasks, SwayTask()))
-_PAIR_RUNNING = replace(_PAIR_SWAYING, swing=RUNNING_SWING)
+_PAIR_RUNNING = replace(_PAIR_SWAYING, swing=RUNNING_SWING, settles=True)
 _PAIR_DOUBLE = PhaseControl(
     tasks=(ComTask((1.0, 3.0)), SwayTask(), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
     unload_legs=(Leg.REAR,),

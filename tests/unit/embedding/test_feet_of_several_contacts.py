@@ -8,13 +8,17 @@ from contact_flags import take_in
 
 from template_control.embedding.contacts import CONTACTS, ContactOptions, set_contacts
 from template_control.embedding.free.options import FreeOptions, TrotOptions, default_options
+from template_control.embedding.modes import modes
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.swing import FEET, spread_contacts
+from template_control.embedding.tick import TICK, stand
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
+from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
+from template_control.whole_body.problem import QP_DATA
 from template_control.whole_body.task import References
 
 PAIRS = ((0, 3), (1, 2))
@@ -36,6 +40,27 @@ def test_a_foot_stands_on_one_of_its_contacts():
     assert take_in(contacts, flags(0, 2, 3), None, (True, False), DT).tolist() == [True, False]
     assert take_in(contacts, flags(3), None, (False, False), DT).tolist() == [True, False]
     assert take_in(contacts, flags(), None, (False, False), DT).tolist() == [False, False]
+
+
+@pytest.mark.parametrize(
+    ("options", "node", "bears"),
+    [
+        (FreeOptions(), "SS_sc^r", []),
+        (FreeOptions(), "SS_av^w", [0]),
+        (TrotOptions(), "SS_sc^r", []),
+        (TrotOptions(), "SS_av^w", [0]),
+    ],
+)
+def test_a_foot_that_has_bounced_bears_nothing_in_a_run(options, node, bears):
+    robot = load_floating_robot("bolt")
+    tick, qp = np.zeros(1, TICK), np.zeros(1, QP_DATA)
+    tick["mode"] = modes(AUTOMATON, robot.nv, options.phases)[node].data
+    tick["feet"]["roles"] = 0, 1
+    stand(tick, robot.data, References().data, qp)
+    assert qp["contact"][0, : int(qp["contacts"][0])].tolist() == bears
+    tick["contacts"]["touching"][0, 0] = 1
+    stand(tick, robot.data, References().data, qp)
+    assert qp["contact"][0, : int(qp["contacts"][0])].tolist() == [0]
 
 
 def offsets(swung, yaw=0.0):
