@@ -23,7 +23,7 @@ def settled(record):
 
 
 @pytest.mark.slow(seconds=4)
-@pytest.mark.parametrize(("name", "speed"), [("five-link-3d", 2.0), ("runner-3d", 5.0)])
+@pytest.mark.parametrize(("name", "speed"), [("five-link-3d", 2.0), ("runner-3d", 4.0)])
 def test_it_runs_straight_at_its_speed(name, speed):
     record = run(name, speed, 30)
     assert not record.fell, record.fall_reason

@@ -135,9 +135,8 @@ _SOLE_RUNNING = PhaseControl(
     # half of the stance, and the angular momentum that is left costs a fifth of the speed.
     tasks=(
         ComTask((0.01, 10.0), _SOLE_GAINS),
-        # As fast as on point feet, in either way, a change of the speed turns the trunk until it
-        # falls.
-        SpinTask(bandwidth=35.0, turning=(0.26, 0.26, 0.2)),
+        # As fast as on point feet, a change of the speed turns the trunk until it falls.
+        SpinTask(bandwidth=35.0),
         FootTask(),
         SideFootTask(),
         SoleTask(),
