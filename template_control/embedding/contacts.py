@@ -78,7 +78,7 @@ CONTACTS = np.dtype(
 IN_AIR, ON_GROUND, DUE = 0, 1, 2
 """Expectation of the path for a foot; one that is due to land may do either."""
 
-NO_FORCE: Array = np.zeros((0, 0))
+NO_FORCE: Array = np.zeros((0, 2))
 """In place of forces that are not measured."""
 
 

@@ -20,7 +20,7 @@ from template_control.robot.legs import (
     straight_legs,
 )
 from template_control.robot.requirements import add_feet, check_size
-from template_control.robot.robot import WORLD_ALIGNED, Robot
+from template_control.robot.robot import Robot
 from template_control.robot.sole import Patch
 from template_control.robot.terms import UP, sources
 from template_control.robot.urdf import with_masses
@@ -178,9 +178,7 @@ class Biped(Robot):
         )
         self.heading_frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
-        self._sources = sources(
-            model, data, self._foot_ids, self._joint_limits, planar=self.directions <= UP
-        )
+        self._sources = sources(model, data, self._foot_ids, self._joint_limits)
         self._take_patches()
         self._look()
         self.spread: Array = np.zeros((len(feet), 2))
@@ -296,20 +294,11 @@ class Biped(Robot):
     def _prepare(self) -> None:
         """Make what :meth:`update` reads and writes."""
 
-    def _compute(self, q: Array, v: Array) -> tuple[Array, ...]:
-        """Let Pinocchio compute all at (q, v).
-
-        Returns:
-            Of each contact's frame the (6,) classical acceleration dJ/dt v, linear then angular, in
-            the world's axes [m/s^2, rad/s^2].
-        """
-        model, data = self.model, self._data
-        place, drift = pin.updateFramePlacement, pin.getFrameClassicalAcceleration
-        pin.computeAllTerms(model, data, q, v)
-        pin.centerOfMass(model, data)  # without q: turns data.a = dJ/dt v into the CoM's bias
-        for frame in self._foot_ids:
-            place(model, data, frame)
-        return tuple([drift(model, data, i, WORLD_ALIGNED).vector for i in self._foot_ids])
+    def _compute(self, q: Array, v: Array) -> None:
+        """Let Pinocchio compute all at (q, v)."""
+        pin.computeAllTerms(self.model, self._data, q, v)
+        # Without q: turns data.a = dJ/dt v into the CoM's bias.
+        pin.centerOfMass(self.model, self._data)
 
     def neutral(self) -> Array:
         """(nq,) upright, with straight vertical legs."""

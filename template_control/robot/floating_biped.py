@@ -130,6 +130,7 @@ class FloatingBaseBiped(Biped):
         self.heading = 0.0
         self.update(self._neutral, np.zeros(self.nv))
         # A hip is the point of its axis that is in the plane in which the leg swings.
+        pin.updateFramePlacements(model, data)
         for hip, foot, point in zip(self._hips, self._foot_ids, self._in_leg, strict=True):
             away = data.oMf[foot].translation[1] - hip.translation[1]
             point[:] = hip.rotation.T @ (0.0, away, 0.0)
@@ -267,8 +268,8 @@ class FloatingBaseBiped(Biped):
                 )
             q = q.copy()
             q[3:7] /= length
-        drift = self._compute(q, v)
-        if not gather_floating(self._kept, q, v, drift):
+        self._compute(q, v)
+        if not gather_floating(self._kept, q, v):
             raise self._diverged(q, v)
 
     def face(self, heading: float, origin: Array) -> None:

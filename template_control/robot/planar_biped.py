@@ -136,8 +136,8 @@ class PlanarBiped(Biped):
         Raises:
             DivergedError: if a value is NaN or infinite.
         """
-        drift = self._compute(q, v)
-        if not gather_planar(self._kept, q, v, drift):
+        self._compute(q, v)
+        if not gather_planar(self._kept, q, v):
             raise self._diverged(q, v)
 
     def turn_gravity(self, angle: float) -> None:

@@ -124,18 +124,76 @@ Sources = tuple[Any, ...]
 """Views into Pinocchio's data, as a plain tuple for :func:`~.structured.keep`."""
 
 
-def sources(
-    model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array, *, planar: bool
-) -> Sources:
+def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
     """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
     ``frames`` are the contacts'; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and
-    upper stops [rad], damping [N m s/rad]. A planar robot's have no rotations.
+    upper stops [rad], damping [N m s/rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
-    places = tuple(data.oMf[frame].translation for frame in frames)
-    turns = () if planar else tuple(data.oMf[frame].rotation for frame in frames)
-    return (*whole, places, turns, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
+    bodies = [(model.frames[frame].parentJoint, model.frames[frame].placement) for frame in frames]
+    points = (
+        tuple(data.oMi[joint].translation for joint, _ in bodies),
+        tuple(data.oMi[joint].rotation for joint, _ in bodies),
+        tuple(data.v[joint].vector for joint, _ in bodies),
+        tuple(data.a[joint].vector for joint, _ in bodies),
+        np.array([placement.translation for _, placement in bodies]).reshape(-1, 3),
+        np.array([placement.rotation for _, placement in bodies]).reshape(-1, 3, 3),
+    )
+    return (*whole, points, data.Jcom, data.Ag, data.J, carrying(model, frames), limits)
+
+
+@compiled
+def turned(rotation: Array, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector times a rotation (3, 3), summed up in Pinocchio's order: both are the same bits."""
+    return (
+        rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z,
+        rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z,
+        rotation[2, 0] * x + (rotation[2, 1] * y + rotation[2, 2] * z),
+    )
+
+
+@compiled
+def move_point(points: Any, i: int, place: Array, drift: Array) -> None:
+    """Write where the frame of contact ``i`` is, and its classical acceleration dJ/dt v.
+
+    With the joint's place p and rotation R in the world, its velocity (v, w) and acceleration
+    dJ/dt v = (a, b) in its own axes, and the frame's origin r in them:
+
+        p + R r,    R (a + b x r) + R w x R (v + w x r),    R b
+
+    Args:
+        points: of :func:`sources`.
+        i: number of the contact.
+        place: (3,) overwritten, in the world [m].
+        drift: (6,) overwritten, linear then angular, in the world's axes [m/s^2, rad/s^2].
+    """
+    origins, rotations, velocities, accelerations, offsets, _ = points
+    origin, rotation, v, a, r = (
+        origins[i],
+        rotations[i],
+        velocities[i],
+        accelerations[i],
+        offsets[i],
+    )
+    x, y, z = turned(rotation, r[0], r[1], r[2])
+    place[0], place[1], place[2] = x + origin[0], y + origin[1], z + origin[2]
+    vx, vy, vz = turned(
+        rotation,
+        v[0] + (v[4] * r[2] - v[5] * r[1]),
+        v[1] + (v[5] * r[0] - v[3] * r[2]),
+        v[2] + (v[3] * r[1] - v[4] * r[0]),
+    )
+    wx, wy, wz = turned(rotation, v[3], v[4], v[5])
+    ax, ay, az = turned(
+        rotation,
+        a[0] + (a[4] * r[2] - a[5] * r[1]),
+        a[1] + (a[5] * r[0] - a[3] * r[2]),
+        a[2] + (a[3] * r[1] - a[4] * r[0]),
+    )
+    drift[0], drift[1] = ax + (wy * vz - wz * vy), ay + (wz * vx - wx * vz)
+    drift[2] = az + (wx * vy - wy * vx)
+    drift[3], drift[4], drift[5] = turned(rotation, a[3], a[4], a[5])
 
 
 @compiled
@@ -186,7 +244,7 @@ def onward(facing: float) -> float:
 
 
 @compiled
-def gather_planar(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bool:
+def gather_planar(kept: Any, q: Array, v: Array) -> bool:
     """Write the planar terms at the state that Pinocchio has last computed; True if it is finite.
 
     They are of the frame whose x points where the robot goes, as ``facing`` of the data says:
@@ -197,12 +255,10 @@ def gather_planar(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bo
             :class:`Jacobians` ``nonlinear_effects``, ``com``, ``momentum``, ``contact`` and
             ``joints``, all of them overwritten.
         q, v: (nv,) the state.
-        drift: of each contact's frame the (6,) classical acceleration dJ/dt v, linear then angular,
-            in the world's axes [m/s^2, rad/s^2].
     """
     views, data, out = kept.value
-    centre, speed, pull, momentum, weight, places, _ = views[:7]
-    com_jacobian, centroidal, jacobian, carries, limits = views[7:]
+    centre, speed, pull, momentum, weight, points = views[:6]
+    com_jacobian, centroidal, jacobian, carries, limits = views[6:]
     effects, jcom, jspin, contact, joints = out
     s = data[0]
     finite, on = gather_joints(q, v, limits, s, effects, joints), onward(s.facing)
@@ -212,9 +268,9 @@ def gather_planar(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bo
     for k in range(q.shape[0]):
         jcom[0, k], jcom[1, k] = on * com_jacobian[0, k], com_jacobian[2, k]
         jspin[0, k] = on * centroidal[4, k]
-    r = s.foot_radius
+    r, place, drift = s.foot_radius, np.empty(3), np.empty(PATCH)
     for i in range(contact.shape[0]):
-        place = places[i]
+        move_point(points, i, place, drift)
         x, z = place[0], place[2]
         s.contact_position[i, 0], s.contact_position[i, UP] = on * x, z - r
         for k in range(q.shape[0]):
@@ -222,8 +278,8 @@ def gather_planar(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bo
             # Rolling without slip: the material point below the sphere's centre is at rest.
             contact[i, 0, k] = on * (jacobian[0, k] + turn * z - r * turn) * carries[i, k]
             contact[i, 1, k] = (jacobian[2, k] - turn * x) * carries[i, k]
-        s.contact_bias[i, 0] = on * (drift[i][0] - r * drift[i][4])
-        s.contact_bias[i, UP] = drift[i][2]
+        s.contact_bias[i, 0] = on * (drift[0] - r * drift[4])
+        s.contact_bias[i, UP] = drift[2]
         moving = np.dot(contact[i], v)
         s.contact_velocity[i, 0], s.contact_velocity[i, UP] = moving[0], moving[1]
     _gather_feet(s)
@@ -260,7 +316,7 @@ def _gather_feet(s: Any) -> None:
 
 
 @compiled
-def gather_floating(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> bool:
+def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
     As :func:`gather_planar`, with q (nq,), v (nv,); ``kept`` has ``turning`` before ``joints``, and
@@ -271,8 +327,8 @@ def gather_floating(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> 
     [m].
     """
     views, data, out, base = kept.value
-    centre, speed, _, momentum, weight, places, turns = views[:7]
-    jcom_world, centroidal, jacobian, carries, limits = views[7:]
+    centre, speed, _, momentum, weight, points = views[:6]
+    jcom_world, centroidal, jacobian, carries, limits = views[6:]
     effects, jcom, jspin, contact, jturning, joints = out
     frame, trunk = base
     rotation, st, nv = trunk[0], data[0], v.shape[0]
@@ -310,8 +366,9 @@ def gather_floating(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> 
     st.momentum_bias[0] = c * moment[0] + s * moment[1]
     st.momentum_bias[1] = c * moment[1] - s * moment[0]
     st.momentum_bias[2] = moment[2]
+    place, drift = np.empty(3), np.empty(PATCH)
     for i in range(contact.shape[0]):
-        place = places[i]
+        move_point(points, i, place, drift)
         px, py, pz = place[0], place[1], place[2]
         x, y = px - frame[0], py - frame[1]
         st.contact_position[i, 0], st.contact_position[i, 1] = c * x + s * y, c * y - s * x
@@ -323,11 +380,11 @@ def gather_floating(kept: Any, q: Array, v: Array, drift: tuple[Array, ...]) -> 
             jy = (jacobian[1, k] + wz * px - wx * (pz - r)) * carries[i, k]
             contact[i, 0, k], contact[i, 1, k] = c * jx + s * jy, c * jy - s * jx
             contact[i, 2, k] = (jacobian[2, k] + wx * py - wy * px) * carries[i, k]
-        bx, by = drift[i][0] - r * drift[i][4], drift[i][1] + r * drift[i][3]
+        bx, by = drift[0] - r * drift[4], drift[1] + r * drift[3]
         st.contact_bias[i, 0], st.contact_bias[i, 1] = c * bx + s * by, c * by - s * bx
-        st.contact_bias[i, 2] = drift[i][2]
+        st.contact_bias[i, 2] = drift[2]
         if contact.shape[1] == PATCH:
-            _gather_patch(st, i, (jacobian, carries, drift[i]), contact[i], frame, turns[i])
+            _gather_patch(st, i, (jacobian, carries, drift), contact[i], frame, points)
         moving = np.dot(contact[i], v)
         for k in range(contact.shape[1]):
             st.contact_velocity[i, k] = moving[k]
@@ -351,12 +408,12 @@ def _gather_patch(
     views: tuple[Array, Array, Array],
     contact: Array,
     frame: Array,
-    turn: Array,
+    points: Any,
 ) -> None:
     """Write the angular rows of a patch, and its axes.
 
     ``views`` are the joints' Jacobians, which of them move each contact, and the drift of this one;
-    ``turn`` (3, 3) is the rotation of its frame to the world.
+    ``points`` are of :func:`sources`.
     """
     jacobian, carries, drift = views
     c, sine = frame[2], frame[3]
@@ -367,10 +424,14 @@ def _gather_patch(
     s.contact_bias[patch, 3] = c * drift[3] + sine * drift[4]
     s.contact_bias[patch, 4] = c * drift[4] - sine * drift[3]
     s.contact_bias[patch, 5] = drift[5]
+    own = points[5][patch]
     for k in range(3):
-        s.contact_axes[patch, 0, k] = c * turn[0, k] + sine * turn[1, k]
-        s.contact_axes[patch, 1, k] = c * turn[1, k] - sine * turn[0, k]
-        s.contact_axes[patch, 2, k] = turn[2, k]
+        x, y, z = turned(points[1][patch], own[0, k], own[1, k], own[2, k])
+        s.contact_axes[patch, 0, k], s.contact_axes[patch, 1, k] = (
+            c * x + sine * y,
+            c * y - sine * x,
+        )
+        s.contact_axes[patch, 2, k] = z
 
 
 @compiled

@@ -26,6 +26,8 @@ def multiply_add(left: Array, right: Array, out: Array) -> None:
     """out += left right, each entry summed up from its value in ``out``, in order."""
     for i in range(out.shape[0]):
         for k in range(left.shape[1]):
+            if left[i, k] == 0.0:  # a contact moves with few of the joints
+                continue
             for j in range(out.shape[1]):
                 out[i, j] += left[i, k] * right[k, j]
 
@@ -59,16 +61,16 @@ def eliminate(
     factor = mass_matrix.copy()
     if not cholesky(factor, nv):
         return False
-    # Two arrays, each in a row in memory: M^-1 of the columns of S and of -h, and M^-1 J^T.
-    uncontacted, jt = np.zeros((nv, nu + 1)), np.empty((nv, m))
+    # M^-1 of the columns of S, of -h and of J^T, at once: each step waits for the one before.
+    columns = np.zeros((nv, nu + 1 + m))
     for j in range(nu):
-        uncontacted[base_dof + j, j] = 1.0
+        columns[base_dof + j, j] = 1.0
     for i in range(nv):
-        uncontacted[i, nu] = -nonlinear_effects[i]
+        columns[i, nu] = -nonlinear_effects[i]
         for j in range(m):
-            jt[i, j] = jacobian[j, i]
-    solve_cholesky(factor, nv, uncontacted)
-    solve_cholesky(factor, nv, jt)
+            columns[i, nu + 1 + j] = jacobian[j, i]
+    solve_cholesky(factor, nv, columns)
+    uncontacted, jt = columns[:, : nu + 1].copy(), columns[:, nu + 1 :].copy()
     delassus = np.zeros((m, m))
     multiply_add(jacobian, jt, delassus)
     f_map[:] = 0.0

@@ -218,8 +218,7 @@ def assemble(
             bias[i * directions + d] = r.contact_bias[point, axis] + sliding
     if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
         return SINGULAR
-    factor[:] = 0.0
-    gradient[:] = 0.0
+    factor[:], gradient[:] = 0.0, 0.0
     row = np.empty(nu + 1)
     for i in range(nu):
         factor[i, i] = p.torque_cost
@@ -228,8 +227,9 @@ def assemble(
             continue
         row[:] = 0.0
         for k in range(nv):
-            for j in range(nu + 1):
-                row[j] += tasks[t, k] * a_map[k, j]
+            if tasks[t, k] != 0.0:  # a foot moves with few of the joints
+                for j in range(nu + 1):
+                    row[j] += tasks[t, k] * a_map[k, j]
         row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
         _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
     for i in range(contacts):
