@@ -85,7 +85,7 @@ def draw(axes: Axes, gait: WalkingGait, lateral: LateralGait) -> None:
             [foot[0] + gait.step_length, place(path, aim, 0.0, com, feet).y],
         )
         motion = np.array([*com, *feet, following[1]])
-        way = np.array([transition(path, 0.0, t, 1.0) @ motion for t in times])
+        way = np.array([transition(path, 0.0, t) @ motion for t in times])
         axes.plot(foot[0] + stride.sample(times)[:, 0], way[:, 0], "k")
         axes.plot(*foot, "o", color="C0" if side is Side.LEFT else "C1")
         foot, com, side = following, way[-1], side.other

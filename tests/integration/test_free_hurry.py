@@ -68,7 +68,6 @@ def test_an_outlook_is_what_the_bounds_leave():
         offset=np.zeros(2),
         steps=np.array([0.1, 0.6]),
         reach=0.4,
-        stretch=1.0,
     )
     found = Placement(0.6, 0.75, 0.1, 0.3, np.array([0.5, 0.2]), np.array([-0.2, -0.5]))
     seen = lateral_forecast(found, aim)

@@ -178,7 +178,6 @@ _NO_AIM = LateralAim(
     offset=np.zeros(2),
     steps=np.zeros(2),
     reach=0.0,
-    stretch=1.0,
 )
 """Of a robot that has walked towards no gait yet: its path comes to no foothold."""
 
@@ -212,6 +211,7 @@ class LateralPlanner:
         self._gait: Gait | None = None
         self._lateral: LateralGait
         self._aim = _NO_AIM
+        self._stretch = 1.0
         self._planar: TemplatePath | None = None
         self._path: LateralPath
         self._landed: Placement | None = None
@@ -293,6 +293,7 @@ class LateralPlanner:
         if turned:
             state[1] -= self._lateral.speed * self.wish.turn
         self.data["cycle"] = state
+        self._stretch = self.learnt.stretch
         self._aim = lateral_aim(self._lateral, self.cycle, stance, self.learnt, self.options)
         if self._lateral.ahead and not turned:
             self._aim = before_turn(self._aim, self._lateral, self.wish.turn)
@@ -319,6 +320,6 @@ class LateralPlanner:
         return self._path, self._aim
 
     def _take(self, path: TemplatePath) -> None:
-        if path is not self._planar:
+        if path is not self._planar or self._stretch != self._path.stretch:
             self._planar = path
-            self._path = lateral_path(path.strides, self._gravity, self._ratio)
+            self._path = lateral_path(path.strides, self._gravity, self._ratio, self._stretch)

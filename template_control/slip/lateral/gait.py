@@ -167,7 +167,7 @@ def lateral_gait(
         raise GaitError(
             f"gait {gait.name!r} has no sideways step: {stride.outcome.reason or 'no foot lands'}"
         )
-    m = transition(path, 0.0, path.section, 1.0)
+    m = transition(path, 0.0, path.section)
     a, b = m[:, :2], m[:, _NEXT] - (1.0, 0.0)
     o = scaled(options or LateralOptions(), Scale.of(p))
     cost = _cost_to_go(a, b, np.array(o.state_cost), o.step_cost)

@@ -57,6 +57,10 @@ class LateralPath(NamedTuple):
         stance: index, 0 or 1, of the foothold next to which the next foot lands.
         ratio: of dy/dt to that with the angular momentum about the CoM, as a robot sways; c_i is
             times it. 1 of the template, whose legs weigh nothing.
+        stretch: single stance takes this times as long as on the path.
+        nodes: (n,) times from which the motion is known, the last is the section [s].
+        ahead: (n, 3, COLUMNS) y at the touchdown, and y and dy/dt at the section, per unit of y,
+            dy/dt and each foothold's y at the nodes; after the touchdown the first is y itself.
     """
 
     coefficients: Array
@@ -68,15 +72,20 @@ class LateralPath(NamedTuple):
     section: float
     stance: int
     ratio: float
+    stretch: float
+    nodes: Array
+    ahead: Array
 
 
-def lateral_path(strides: Sequence[Stride], gravity: float, ratio: float = 1.0) -> LateralPath:
+def lateral_path(
+    strides: Sequence[Stride], gravity: float, ratio: float = 1.0, stretch: float = 1.0
+) -> LateralPath:
     """Of strides each of which starts where the one before ended.
 
     Args:
         strides: at least one, such as those of the path that a robot follows.
         gravity: g [m/s^2].
-        ratio: see :class:`LateralPath`.
+        ratio, stretch: see :class:`LateralPath`.
     """
     metas, resets, sections, offset = [], [], [], 0.0
     for stride in strides:
@@ -91,7 +100,7 @@ def lateral_path(strides: Sequence[Stride], gravity: float, ratio: float = 1.0) 
     footholds, touchdown, stance = _footholds(meta, resets)
     height = float(strides[0].cy[0, 0])  # of a robot that falls it may be below its foot
     section = next((time for time in sections if time > touchdown), np.inf)
-    return LateralPath(
+    path = LateralPath(
         coefficients=np.concatenate([(s.cx, s.cy) for s in strides], axis=1),
         meta=meta,
         footholds=footholds,
@@ -101,7 +110,25 @@ def lateral_path(strides: Sequence[Stride], gravity: float, ratio: float = 1.0) 
         section=section if height > 0.0 else np.inf,
         stance=stance,
         ratio=float(ratio),
+        stretch=float(stretch),
+        nodes=np.zeros(0),
+        ahead=np.zeros((0, 3, COLUMNS)),
     )
+    if not np.isfinite(path.section):
+        return path
+    nodes = _nodes(path)
+    return path._replace(nodes=nodes, ahead=_ahead(path, nodes))
+
+
+def _nodes(path: LateralPath) -> Array:
+    """Times from the path's start to its section, as far apart as a step of the integration."""
+    nodes = [np.zeros(1)]
+    for start, duration in path.meta[:, :2]:
+        until = min(start + duration, path.section)
+        if until > start + _SAME:
+            steps = int(np.ceil((until - start) / path.longest))
+            nodes.append(np.linspace(start, until, steps + 1)[1:])
+    return np.concatenate(nodes)
 
 
 def _footholds(
@@ -153,12 +180,12 @@ def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> N
 
 
 @compiled
-def advance(path: LateralPath, start: float, end: float, stretch: float, motion: Array) -> None:
+def _advance(path: LateralPath, start: float, end: float, motion: Array) -> None:
     """Carry motions on along the path, by the classical Runge-Kutta method.
 
-    ``end`` is at most the path's section [s]; single stance takes ``stretch`` times as long as on
-    the path. ``motion`` (2, COLUMNS) are y and dy/dt at ``start``, overwritten by those at ``end``,
-    per unit of y, dy/dt and each foothold's y at some earlier time.
+    ``end`` is at most the path's section [s]. ``motion`` (2, COLUMNS) are y and dy/dt at ``start``,
+    overwritten by those at ``end``, per unit of y, dy/dt and each foothold's y at some earlier
+    time.
     """
     com, before, middle, after = np.empty(6), np.empty(2), np.empty(2), np.empty(2)
     meta, footholds = path.meta, path.footholds
@@ -169,7 +196,7 @@ def advance(path: LateralPath, start: float, end: float, stretch: float, motion:
         steps = int(np.ceil((until - begin) / path.longest))
         h = (until - begin) / steps
         rear, front = footholds[row, 0], footholds[row, 1]
-        dt = h * stretch if (rear >= 0) != (front >= 0) else h
+        dt = h * path.stretch if (rear >= 0) != (front >= 0) else h
         t = begin - meta[row, 0]
         pulls(path, row, t, com, before)
         for _ in range(steps):
@@ -198,17 +225,57 @@ def advance(path: LateralPath, start: float, end: float, stretch: float, motion:
 
 
 @compiled
-def transition(path: LateralPath, start: float, end: float, stretch: float) -> Array:
+def transition(path: LateralPath, start: float, end: float) -> Array:
     """(2, COLUMNS) matrix M of the motion between two times on the path.
 
-    (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m]; arguments as for
-    :func:`advance`. A shift of all of them shifts the end alike: M[:, 0] + M[:, 2:].sum(1) = (1,
+    (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m]; ``end`` is at most the
+    path's section [s]. A shift of all of them shifts the end alike: M[:, 0] + M[:, 2:].sum(1) = (1,
     0).
     """
     motion = np.zeros((2, COLUMNS))
     motion[0, 0] = motion[1, 1] = 1.0
-    advance(path, start, end, stretch, motion)
+    _advance(path, start, end, motion)
     return motion
+
+
+@compiled
+def _join(before: Array, after: Array, out: Array) -> None:
+    """Write the rows of ``after`` (r, COLUMNS), as they are before a motion (2, COLUMNS)."""
+    for r in range(after.shape[0]):
+        for c in range(COLUMNS):
+            out[r, c] = after[r, 0] * before[0, c] + after[r, 1] * before[1, c]
+            if c >= 2:
+                out[r, c] += after[r, c]
+
+
+@compiled
+def _ahead(path: LateralPath, nodes: Array) -> Array:
+    """The motion from each node on, see :class:`LateralPath`, from the last to the first."""
+    last = nodes.shape[0] - 1
+    ahead = np.zeros((last + 1, 3, COLUMNS))
+    ahead[last, 0, 0] = ahead[last, 1, 0] = ahead[last, 2, 1] = 1.0
+    for k in range(last - 1, -1, -1):
+        _join(transition(path, nodes[k], nodes[k + 1]), ahead[k + 1], ahead[k])
+        if nodes[k] >= path.touchdown - _SAME:
+            ahead[k, 0, :] = 0.0
+            ahead[k, 0, 0] = 1.0
+    return ahead
+
+
+@compiled
+def look_ahead(path: LateralPath, time: float) -> Array:
+    """(3, COLUMNS) motion from a time on the path [s]: rows as in its ``ahead``.
+
+    It is one step of the integration to the next node, and the motion from there on.
+    """
+    k, out = 0, np.empty((3, COLUMNS))
+    while k + 1 < path.nodes.shape[0] and path.nodes[k] <= time:
+        k += 1
+    _join(transition(path, time, path.nodes[k]), path.ahead[k], out)
+    if time >= path.touchdown:
+        out[0, :] = 0.0
+        out[0, 0] = 1.0
+    return out
 
 
 @compiled

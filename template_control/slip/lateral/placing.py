@@ -20,13 +20,11 @@ from template_control.slip.lateral.gait import (
     Side,
 )
 from template_control.slip.lateral.path import (
-    COLUMNS,
     NEXT,
     LateralPath,
     acceleration,
-    advance,
     lateral_path,
-    transition,
+    look_ahead,
 )
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -100,7 +98,6 @@ class LateralAim(NamedTuple):
         offset: (2,) what the robot adds to that state.
         steps: (2,) least and largest distance from the stance foot to the next, to the left [m].
         reach: largest lateral distance between CoM and foot at touchdown [m].
-        stretch: single stance takes this times as long as on the path.
     """
 
     state: Array
@@ -110,7 +107,6 @@ class LateralAim(NamedTuple):
     offset: Array
     steps: Array
     reach: float
-    stretch: float
 
 
 class Placement(NamedTuple):
@@ -167,7 +163,6 @@ def lateral_aim(
         offset=learnt.offset[stance.row],
         steps=np.array(steps),
         reach=options.reach,
-        stretch=learnt.stretch,
     )
 
 
@@ -220,19 +215,16 @@ def place(path: LateralPath, aim: LateralAim, time: float, com: Array, feet: Arr
     if not np.isfinite(path.section):
         nowhere = np.full(2, np.nan)
         return Placement(np.nan, np.nan, np.nan, np.nan, nowhere, nowhere)
-    motion = np.zeros((2, COLUMNS))
-    motion[0, 0] = motion[1, 1] = 1.0
-    advance(path, time, path.touchdown, aim.stretch, motion)
-    landing = motion[0, 0] * com[0] + motion[0, 1] * com[1]
-    for i in range(2):
-        landing += motion[0, _FOOTHOLDS + i] * feet[i]
-    advance(path, max(time, path.touchdown), path.section, aim.stretch, motion)
-    ahead, slope = np.empty(2), np.empty(2)
-    for k in range(2):
-        ahead[k] = motion[k, 0] * com[0] + motion[k, 1] * com[1] + aim.offset[k]
+    motion = look_ahead(path, time)
+    landing, ahead, slope = 0.0, np.empty(2), np.empty(2)
+    for row in range(3):
+        total = motion[row, 0] * com[0] + motion[row, 1] * com[1]
         for i in range(2):
-            ahead[k] += motion[k, _FOOTHOLDS + i] * feet[i]
-        slope[k] = motion[k, _NEXT]
+            total += motion[row, _FOOTHOLDS + i] * feet[i]
+        if row == 0:
+            landing = total
+        else:
+            ahead[row - 1], slope[row - 1] = total + aim.offset[row - 1], motion[row, _NEXT]
     stance = feet[path.stance]
     # The error of the state is e + s p; that of the step p - stance - step.
     s0, s1 = slope[0] - 1.0, slope[1]
@@ -244,20 +236,19 @@ def place(path: LateralPath, aim: LateralAim, time: float, com: Array, feet: Arr
     wanted = top / bottom
     y = min(max(wanted, landing - aim.reach), landing + aim.reach)
     y = min(max(y, stance + aim.steps[0]), stance + aim.steps[1])
-    left = _left(path, time, aim.stretch)
-    return Placement(y, wanted, left, landing, ahead, slope)
+    return Placement(y, wanted, _left(path, time), landing, ahead, slope)
 
 
 @compiled
-def _left(path: LateralPath, time: float, stretch: float) -> float:
-    """Time to touchdown [s]; single stance takes ``stretch`` times as long as on the path."""
+def _left(path: LateralPath, time: float) -> float:
+    """Time to touchdown [s]."""
     left = 0.0
     for row in range(path.meta.shape[0]):
         start = path.meta[row, 0]
         span = min(start + path.meta[row, 1], path.touchdown) - max(start, time)
         if span > 0.0:
             single = (path.footholds[row, 0] >= 0) != (path.footholds[row, 1] >= 0)
-            left += span * (stretch if single else 1.0)
+            left += span * (path.stretch if single else 1.0)
     return left
 
 
@@ -267,7 +258,6 @@ def sideways() -> None:
     u = controls(1.152, p.leg_stiffness, p.leg_stiffness)
     stride = simulate_stride(p, STRIDE_START[StrideKind.WALK], VLO.state([1.1, 0.978, 0.0]), u)
     path, two = lateral_path((stride,), p.gravity), np.zeros(2)
-    transition(path, 0.0, path.section, 1.0)
     acceleration(path, 0.0, 0.0, np.zeros(NEXT + 1))
     aim = LateralAim(
         state=two,
@@ -277,7 +267,6 @@ def sideways() -> None:
         offset=two,
         steps=two,
         reach=0.1,
-        stretch=1.0,
     )
     place(path, aim, 0.0, two, two)
 

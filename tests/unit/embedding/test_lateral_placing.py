@@ -25,7 +25,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.path import transition
+from template_control.slip.lateral.path import look_ahead, transition
 from template_control.slip.lateral.placing import LATERAL as KERNELS
 from template_control.slip.lateral.placing import before_turn, contact, pivot
 from template_control.slip.maps.section import APEX, VLO
@@ -134,10 +134,21 @@ def test_the_law_returns_to_the_periodic_motion(gait):
 @settings(deadline=None, max_examples=50)
 @given(ANY, ANY)
 def test_all_moved_aside_is_moved_aside(y, start):
-    matrix = transition(PATH, (start + 0.5) * PATH.touchdown, PATH.section, 1.0)
+    matrix = transition(PATH, (start + 0.5) * PATH.touchdown, PATH.section)
     np.testing.assert_allclose(matrix[:, 0] + matrix[:, 2:].sum(axis=1), [1.0, 0.0], atol=1e-12)
     there = matrix @ [y, 0.0, y, y, y]
     np.testing.assert_allclose(there, [y, 0.0], atol=1e-12)
+
+
+@settings(deadline=None, max_examples=50)
+@given(st.floats(0.0, 1.0), st.floats(0.9, 1.2))
+def test_what_is_ahead_is_the_same_from_a_node_on(share, stretch):
+    path = lateral_path((STRIDE, STRIDE), P.gravity, stretch=stretch)
+    time = share * path.section
+    ahead = look_ahead(path, time)
+    np.testing.assert_allclose(ahead[1:], transition(path, time, path.section), atol=1e-5)
+    landing = transition(path, time, max(time, path.touchdown))[0]
+    np.testing.assert_allclose(ahead[0], landing, atol=1e-5)
 
 
 @settings(deadline=None, max_examples=50)
@@ -225,12 +236,11 @@ def test_a_path_without_a_touchdown_has_no_foothold():
 
 
 def test_where_single_stance_lasts_longer_the_foot_is_put_further_out():
-    slow = LateralLearnt(stretch=1.07)
+    slow = lateral_path((STRIDE, STRIDE), P.gravity, stretch=1.07)
     for side in Side:
         to, cycle = aim(side)
-        late, _ = aim(side, slow)
         com = cycle.states[side.row]
-        there, further = (place(PATH, x, 0.0, com, np.zeros(2)) for x in (to, late))
+        there, further = (place(path, to, 0.0, com, np.zeros(2)) for path in (PATH, slow))
         assert side * further.y < side * there.y
         assert np.isclose(further.left, 1.07 * there.left)
 

@@ -52,7 +52,7 @@ def errors(size):
     start, foothold = at_vlo(WALK.vlo, -0.4 * size, 0.3 * size), -size
     truth = step(P, start, TOE, WALK.controls, lambda _t, _s: foothold)
     stride, path = planar(WALK.vlo, WALK.controls)
-    linear = transition(path, 0.0, path.section, 1.0) @ [*start[[1, 4]], 0.0, 0.0, foothold]
+    linear = transition(path, 0.0, path.section) @ [*start[[1, 4]], 0.0, 0.0, foothold]
     sagittal = truth.end[[3, 2, 5]] - VLO.of(stride.state)
     return np.abs(truth.end[[1, 4]] - linear), np.abs(sagittal)
 
