@@ -404,7 +404,9 @@ class EmbeddingController:
         self.slope.land(self.frame.foothold(foot), self.frame.foothold(1 - foot))
         # Off the template's ground, the slope is that of the line through both feet.
         leans = abs(off) > self.supervisor.height_error and self._tilt_axes(self.slope.last, foot)
-        higher, s = self.observer.land(leg), self.observer.now
+        # A pressure that is planned over both feet has nothing to do with the legs' lengths.
+        springs = not (self.mode.control.follow_curve and self.robot.half_length)
+        higher, s = self.observer.land(leg, springs), self.observer.now
         if leans:
             self.supervisor.choose_assist(self.node, s)
         if self.mode.control.use_pre_impact_velocity:

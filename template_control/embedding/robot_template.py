@@ -9,7 +9,7 @@ import numpy as np
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
-from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.options import SOLE_STAND
 from template_control.embedding.standing.curves import StandingOptions
 from template_control.errors import GaitError
 from template_control.robot.biped import Biped
@@ -287,7 +287,7 @@ def standing_options(robot: Biped) -> StandingOptions:
     half = robot.half_length / length
     if not robot.patches:
         return StandingOptions(half_length=half, single=_LIFTED)
-    slant = SOLE_SHARE * robot.half_width / (FreeOptions().step_width * length)
+    slant = SOLE_SHARE * robot.half_width / (SOLE_STAND * length)
     return StandingOptions(half_length=half, slant=slant, shift=_SHIFT, single=_PASSED)
 
 

@@ -170,17 +170,17 @@ class StateObserver:
         self._feet.landed = foot
         self.now.state[1] -= self._rise(foot)
 
-    def land(self, leg: Leg) -> float:
+    def land(self, leg: Leg, springs: bool = True) -> float:
         """Put the ground under the foot which has landed; how much higher it is now [m].
 
         Where that is higher or lower than the rear foot's, the template's rear toe is moved so that
-        its leg keeps its length, and with it its force.
+        its leg keeps its length, and with it its force, where ``springs`` carry.
         """
         s, foot = self.now, self._feet.foot_of_leg[leg]
         self._feet.landed = foot
         higher = self._rise(foot)
         height = s.state[1] - higher
-        if leg is not Leg.REAR:
+        if springs and leg is not Leg.REAR:
             back = s.state[0] - s.toes[Leg.REAR]
             moved = np.sqrt(max(back**2 + s.state[1] ** 2 - height**2, 0.0))
             self._rear_shift = float(back - np.copysign(moved, back))

@@ -57,6 +57,8 @@ class SwingOptions(Checked):
         drop_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
         leg_share: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
+        lag: the reference waits for a foot that is further behind it ahead than this [m]: one that
+            hips at their limits could not follow is not caught up with at once; None: it does not.
     """
 
     clearance: NotNegative = tuned(0.05, LENGTH)
@@ -71,6 +73,7 @@ class SwingOptions(Checked):
     margin: NotNegative = tuned(0.02, LENGTH)
     drop_acceleration: Positive = tuned(10.0, ACCELERATION)
     leg_share: Share = tuned(0.98)
+    lag: Positive | None = tuned(None, LENGTH)
 
 
 _F, _I = np.float64, np.int64
@@ -143,6 +146,18 @@ def swing_step(
         quintic_step(y, top, 0.0, max(2.0 * horizon, dt), dt)
     else:
         quintic_step(y, ground, -landing_speed, to_go, dt)
+
+
+@compiled
+def wait(f: Any, foot: int, x: Array, place: float, speed: float) -> None:
+    """Let a foot's reference wait for the foot, at x ``place`` with a ``speed`` [m, m/s].
+
+    ``f`` and ``x`` are as for :func:`swing_step`.
+    """
+    ahead = x[0] - place
+    if abs(ahead) > f.lag[foot]:
+        x[0] = place + np.copysign(f.lag[foot], ahead)
+        x[1] = speed
 
 
 @compiled

@@ -43,6 +43,7 @@ from template_control.embedding.swing import (
     quintic_step,
     spread_contacts,
     swing_step,
+    wait,
 )
 from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Event
@@ -228,7 +229,7 @@ def advance(kept: Any, dt: float) -> None:
     want.com_push = t.trim if mode.trim_momentum else 0.0
     want.lead, want.ahead = t.path.offset, np.nan
     if t.lateral.half_width > 0.0:
-        sway(t, r, want)
+        sway(t, r, want, curve)
     want.pitch = advance_lean(t.lean, r.attitude[1] - t.frame.angle, dt) + t.frame.angle
     for leg in range(LEGS):
         want.feet[leg] = t.feet.roles[leg]
@@ -286,6 +287,7 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
                 due = path.step_duration - f.swing_time[foot]
             if mode.rolling_contact:
                 foothold = rolled(foothold, path.touchdown_angle, r.foot_radius)
+            wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
             swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
         hip = (r.hips[0] + r.toe_ahead, r.hips[UP] - r.ankle_height)
         want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], r.leg_length)

@@ -182,12 +182,13 @@ class FloatingBackend(RobotBackend):
         lateral, controller.course = motion.planner, o.heading
         if route.section is REST:
             apart = CLOSING * route.parameters.rest_length if self.robot.patches else 0.0
-            q, v = floating_state_in(self.robot, _stand(z, lateral.wish.width, apart))
+            lateral.wish = LateralWish(motion.step_width)
+            q, v = floating_state_in(self.robot, _stand(z, motion.stand_width, apart))
             controller.start(_REAR, first=first)
             return q, v
         side_speed, rate, _ = o.heading(0.0)
         lateral.wish = LateralWish(
-            o.course.step_width or lateral.wish.width,
+            o.course.step_width or motion.step_width,
             left=side_speed * planner.gait.step_duration,
             # A run leans into its turns by and by.
             turn=rate * planner.gait.step_duration if route.section == VLO else 0.0,

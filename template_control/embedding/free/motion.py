@@ -22,7 +22,7 @@ from template_control.embedding.free.lateral import (
     LateralPlanner,
     early_touchdown,
 )
-from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.free.options import SOLE_STAND, FreeOptions
 from template_control.embedding.planners.planner import Context, Decision, decided
 from template_control.embedding.state import TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
@@ -73,7 +73,9 @@ class LateralMotion:
     ) -> None:
         ready(LATERAL)
         scale = Scale.of(parameters)
-        wish = LateralWish(scaled(options, scale).step_width)
+        step = self.step_width = scaled(options, scale).step_width
+        self.stand_width = SOLE_STAND * parameters.rest_length if robot.patches else step
+        wish = LateralWish(step)
         rolling = robot.foot_radius / parameters.rest_length if robot.paired else 0.0
         self.robot, self._feet, self._references = robot, feet, references
         self.planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway, rolling)
@@ -95,6 +97,7 @@ class LateralMotion:
         It turns at once, unless it begins in flight.
         """
         self._now[:2], self._now[2] = course[:2], 0.0
+        self._width = self.planner.wish.width
         self.robot.facing, self._turns = 0.0, 0.0
         if in_flight:
             self._now[1] = 0.0
@@ -237,8 +240,10 @@ class LateralMotion:
         planner = self.planner
         self._now[:], self._turns = 0.0, 0.0
         left = 0.0 if section is REST else planner.wish.left
-        planner.wish = replace(planner.wish, left=left, turn=0.0)
-        planner.walk(supervisor.planner.next_gait())
+        gait = supervisor.planner.next_gait()
+        width = self.stand_width if gait is None else self._width
+        planner.wish = LateralWish(width, left)
+        planner.walk(gait)
         self._turn_trunk(1.0, 0.0)
         planner.aim(SIDES[self._feet.landed])
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
+from template_control.embedding.com_path import sample
 from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
 from template_control.embedding.standing.supports import UNLOADING
 from template_control.slip.automaton.vocabulary import Event
@@ -42,11 +43,11 @@ _REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soo
 
 
 @compiled
-def sway(t: Any, r: Any, want: Any) -> None:
+def sway(t: Any, r: Any, want: Any, curve: tuple[Array, Array, Array]) -> None:
     """Write how a robot on soles, or on pairs of feet, is to sway.
 
-    ``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``. Along a planner's
-    curve the centre of pressure is planned:
+    ``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``, ``curve`` the path's.
+    Along a planner's curve the centre of pressure is planned:
 
         s' = (z'' + g) / h (y - p).
 
@@ -63,7 +64,7 @@ def sway(t: Any, r: Any, want: Any) -> None:
         _stand(t, r, want)
         return
     if mode.follow_curve:
-        want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - _pressure(t, r))
+        want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - _pressure(t, r, curve))
         return
     t.lateral.pressure = np.nan
     want.sway = 0.0
@@ -172,11 +173,11 @@ def _height(t: Any, r: Any) -> float:
 
 
 @compiled
-def _pressure(t: Any, r: Any) -> float:
+def _pressure(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
     """y of the centre of pressure for now [m], planned anew from time to time."""
     lateral = t.lateral
     if np.isnan(lateral.pressure) or t.time - lateral.pressure_at >= _AGAIN * lateral.unit:
-        lateral.pressure, lateral.pressure_at = _planned(t, r), t.time
+        lateral.pressure, lateral.pressure_at = _planned(t, r, curve), t.time
     return lateral.pressure
 
 
@@ -248,7 +249,42 @@ def _rate(t: Any, r: Any) -> float:
 
 
 @compiled
-def _planned(t: Any, r: Any) -> float:
+def front_shares(along: float, apart: float, half: float) -> tuple[float, float]:
+    """Least and largest share of the load that the front foot can bear.
+
+    The centre of pressure is ``along`` ahead of the rear foot's middle, the front foot's is
+    ``apart`` ahead, and both bear it by ``half`` to either side of their middles [m].
+    """
+    if not abs(apart) > 0.0:
+        return 0.0, 1.0
+    one, other = (along - half) / apart, (along + half) / apart
+    least, most = min(one, other), max(one, other)
+    return min(max(least, 0.0), 1.0), min(max(most, 0.0), 1.0)
+
+
+@compiled
+def _shares_of_lifting(
+    t: Any, r: Any, curve: tuple[Array, Array, Array], stays: int, after: float
+) -> tuple[float, float]:
+    """Least and largest share that the foot which lifts off can bear, ``after`` some time [s].
+
+    By the centre of pressure that the curve has ahead: of two soles, one ahead of the other, the
+    loads say both where it is ahead and where to the side.
+    """
+    if not _on_soles(t, r):
+        return 0.0, 1.0
+    com, rear = np.empty(6), t.feet.roles[_REAR]
+    coefficients, meta, look = curve
+    sample(coefficients, meta, look, t.path.time + after, com)
+    lift = max(com[5] + r.gravity, _LIGHTEST * r.gravity)
+    along = com[0] - com[4] * max(com[1], _LOWEST * r.leg_length) / lift
+    apart = r.foot_position[1 - rear, 0] - r.foot_position[rear, 0]
+    least, most = front_shares(along, apart, SOLE_SHARE * t.path.body[5])
+    return (1.0 - most, 1.0 - least) if stays != rear else (least, most)
+
+
+@compiled
+def _planned(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
     """y of the first centre of pressure [m] of the plan to the end of the stride.
 
     Both feet stand until a liftoff, if there is one; then one does, until the touchdown or the
@@ -287,14 +323,17 @@ def _planned(t: Any, r: Any) -> float:
             continue
         for k in range(_PIECES):
             pieces.duration[at], pieces.rate[at] = lasts[stage] / _PIECES, rate
-            # The foot that lifts off gives up its load before.
-            load = 1.0 if stage == 2 else 0.0
+            least, load = 0.0, 1.0 if stage == 2 else 0.0
             if stage == 0:
+                # The foot that lifts off gives up its load before.
                 left = (_PIECES - k - 1) * lasts[0] / _PIECES
-                load = min(left / (UNLOADING * lateral.unit), 1.0)
-            away = load * ((now if stage == 0 else other) - here)
-            pieces.low[at] = here + min(away, 0.0) - half
-            pieces.high[at] = here + max(away, 0.0) + half
+                then = (k + 0.5) * lasts[0] / _PIECES
+                least, load = _shares_of_lifting(t, r, curve, stays, then)
+                load = min(left / (UNLOADING * lateral.unit), load)
+                least = min(least, load)
+            apart = (now if stage == 0 else other) - here
+            pieces.low[at] = here + min(least * apart, load * apart) - half
+            pieces.high[at] = here + max(least * apart, load * apart) + half
             pieces.wish[at] = middle if stage == 2 else here
             at += 1
     start, end = np.empty(2), np.zeros(2)

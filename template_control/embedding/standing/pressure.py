@@ -213,18 +213,19 @@ def best_pressure(
 
     The height is a quintic, between the states x, y, each position, velocity and acceleration, of
     ``start`` (2, 3) and of ``ends`` (n, 2, 3); ``durations`` (d,) are tried to each of these [s].
-    Where p ``jumps``, it may at once be anywhere. The excess is the miss of the end, or by how far
+    One within the slack is better than any that is not. Where p ``jumps``, it may at once be
+    anywhere. The excess is the miss of the end, or by how far
     a leg would be longer than its reach. Centres of pressure ``p`` (k,) and w ``rates`` (k,) of
     the pieces are overwritten; also returns the numbers of the end and of the duration.
     """
     n = p.shape[0]
-    best, least, chosen, lasting = np.inf, np.inf, 0, 0
+    best, least, chosen, lasting, fits = np.inf, np.inf, 0, 0, False
     rise, low, high = np.empty(TERMS), np.empty(n), np.empty(n)
     wish, lasts, rate, found = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     for i in range(durations.shape[0]):
         t = durations[i]
         time = ground.pace * (t + ground.calm * ground.calm / t)
-        if time >= best:
+        if fits and time >= best:
             continue
         for e in range(ends.shape[0]):
             quintic(start[1], ends[e, 1], t, rise)
@@ -252,8 +253,9 @@ def best_pressure(
                 away = max(x - ground.rear, ground.front - x)
                 excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
             cost = max(excess - ground.slack, 0.0) + time
-            if cost < best:
-                best, least, chosen, lasting = cost, excess, e, i
+            holds = excess <= ground.slack
+            if (holds and not fits) or (holds == fits and cost < best):
+                best, least, chosen, lasting, fits = cost, excess, e, i, holds
                 for k in range(n):
                     p[k], rates[k] = found[k], rate[k]
     return best, least, chosen, lasting

@@ -22,6 +22,7 @@ from template_control.embedding.standing.pressure import (
 )
 from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial
 from template_control.slip.similarity import Scale
+from template_control.whole_body.solver import SOLE_SHARE
 
 Array = NDArray[np.float64]
 
@@ -69,8 +70,8 @@ class OverFeet(BetweenFeet):
         """
         unit, rules = Scale.of(self.parameters).time, self._rules
         middle, half = self.place(PLACE), _SHARE * self.options.half_length
-        if not unloading:
-            half += self.options.slant * abs(self.spacing)
+        if self.options.slant and not unloading:  # as the CoM is held there
+            half = SOLE_SHARE * self.options.half_length + self.options.slant * abs(self.spacing)
         ground = Ground(
             rear=float(self.toes[0]),
             front=float(self.toes[1]),

@@ -45,3 +45,15 @@ def test_a_stop_lands_with_the_capture_point_between_the_feet(seed):
     can = (landed[:, None] / np.linspace(*shares, 2001)).ravel()
     best = can[np.abs(can - steps[0]).argmin()]
     assert found == pytest.approx(max(best, steps[1]), abs=1e-4)
+
+
+@pytest.mark.parametrize("apart", [0.17, -0.17, 0.0])
+def test_the_loads_say_where_the_pressure_is_ahead(apart):
+    """A share of the front foot is possible if some places in both soles give that pressure."""
+    half = 0.07
+    shares, ways = np.linspace(0.0, 1.0, 1001), np.linspace(-half, half, 1001)
+    for along in (-0.05, 0.02, 0.1, 0.2):
+        low, high = sway.front_shares(along, apart, half)
+        can = [np.abs(share * apart + ways - along).min() < 1e-3 for share in shares]
+        if any(can):
+            assert shares[can][[0, -1]] == pytest.approx((low, high), abs=1e-2)

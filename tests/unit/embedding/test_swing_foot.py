@@ -13,6 +13,7 @@ from template_control.embedding.swing import (
     meet_wall,
     quintic_step,
     swing_step,
+    wait,
 )
 from template_control.embedding.tick import TICK, move_swings
 from template_control.robot.terms import ROBOT_DATA
@@ -36,6 +37,14 @@ def meet(swing, at, foothold, due):
     """A tick in which a foot is at a wall."""
     place = np.array([at[0], 0.0, at[1]])
     meet_wall(swing.data[0], 0, swing.x, swing.y, place, (foothold, due), 1e-3)
+
+
+@pytest.mark.parametrize(("lag", "place"), [(None, 0.5), (0.2, 0.5), (0.1, 0.42)])
+def test_a_reference_waits_for_a_foot_that_lags(lag, place):
+    swing = Swing(SwingOptions(lag=lag), np.array([0.5, 0.0]), np.array([3.0, 0.0]))
+    wait(swing.data[0], 0, swing.x, 0.32, 2.0)
+    assert swing.x[0] == pytest.approx(place)
+    assert swing.x[1] == (3.0 if place == 0.5 else 2.0)
 
 
 def test_quintic_arrives():
