@@ -37,7 +37,7 @@ from template_control.embedding.planners.look_ahead import (
     residuals,
     slopes,
 )
-from template_control.embedding.planners.planner import ANY_ANGLE, Context
+from template_control.embedding.planners.planner import ANY_ANGLE, Cause, Context
 from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
@@ -205,6 +205,16 @@ def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
     assert 0.9 < reduced.accepted <= 0.9 + OPTIONS.pace
     assert 0.9 < reduced.predicted[0] < reduced.accepted
     assert planner.gait.vlo[0] == pytest.approx(reduced.accepted)
+
+
+@pytest.mark.parametrize("cause", [Cause.TOUCHDOWN, Cause.DEVIATION])
+def test_a_step_goes_on_to_where_it_went(planner, cause):
+    z = row_at(table(), 0.9)[STATE : STATE + 3]
+    wanted, seems = z - [0.5, 0.0, 0.0], z + [0.04, 0.0, 0.0]
+    began = planner.decide(Context(z, wanted))
+    planner.decide(Context(began.predicted, wanted, cause=Cause.FUTURE))
+    assert planner.decide(Context(seems, wanted, cause=cause)).accepted == began.accepted
+    assert planner.decide(Context(seems, wanted)).accepted > began.accepted
 
 
 @pytest.mark.parametrize(("wanted", "end"), [(0.02, 0), (3.0, 1)])
