@@ -127,8 +127,10 @@ Sources = tuple[Any, ...]
 def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
     """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
-    ``frames`` are the contacts'; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and
-    upper stops [rad], damping [N m s/rad].
+    The sixth are those of :func:`move_point`: place, rotation, velocity and acceleration of each
+    contact's joint, and place and rotation of the contact's frame on it. ``frames`` are the
+    contacts'; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and upper stops [rad],
+    damping [N m s/rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
     bodies = [(model.frames[frame].parentJoint, model.frames[frame].placement) for frame in frames]
@@ -168,14 +170,7 @@ def move_point(points: Any, i: int, place: Array, drift: Array) -> None:
         place: (3,) overwritten, in the world [m].
         drift: (6,) overwritten, linear then angular, in the world's axes [m/s^2, rad/s^2].
     """
-    origins, rotations, velocities, accelerations, offsets, _ = points
-    origin, rotation, v, a, r = (
-        origins[i],
-        rotations[i],
-        velocities[i],
-        accelerations[i],
-        offsets[i],
-    )
+    origin, rotation, v, a, r = points[0][i], points[1][i], points[2][i], points[3][i], points[4][i]
     x, y, z = turned(rotation, r[0], r[1], r[2])
     place[0], place[1], place[2] = x + origin[0], y + origin[1], z + origin[2]
     vx, vy, vz = turned(
@@ -427,10 +422,8 @@ def _gather_patch(
     own = points[5][patch]
     for k in range(3):
         x, y, z = turned(points[1][patch], own[0, k], own[1, k], own[2, k])
-        s.contact_axes[patch, 0, k], s.contact_axes[patch, 1, k] = (
-            c * x + sine * y,
-            c * y - sine * x,
-        )
+        s.contact_axes[patch, 0, k] = c * x + sine * y
+        s.contact_axes[patch, 1, k] = c * y - sine * x
         s.contact_axes[patch, 2, k] = z
 
 

@@ -214,9 +214,9 @@ def best_pressure(
     The height is a quintic, between the states x, y, each position, velocity and acceleration, of
     ``start`` (2, 3) and of ``ends`` (n, 2, 3); ``durations`` (d,) are tried to each of these [s].
     One within the slack is better than any that is not. Where p ``jumps``, it may at once be
-    anywhere. The excess is the miss of the end, or by how far
-    a leg would be longer than its reach. Centres of pressure ``p`` (k,) and w ``rates`` (k,) of
-    the pieces are overwritten; also returns the numbers of the end and of the duration.
+    anywhere. The excess is the miss of the end, or by how far a leg would be longer than its reach.
+    Centres of pressure ``p`` (k,) and w ``rates`` (k,) of the pieces are overwritten; also returns
+    the numbers of the end and of the duration.
     """
     n = p.shape[0]
     best, least, chosen, lasting, fits = np.inf, np.inf, 0, 0, False

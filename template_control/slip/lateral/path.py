@@ -263,7 +263,7 @@ def _ahead(path: LateralPath, nodes: Array) -> Array:
 
 
 @compiled
-def look_ahead(path: LateralPath, time: float) -> Array:
+def motion_ahead(path: LateralPath, time: float) -> Array:
     """(3, COLUMNS) motion from a time on the path [s]: rows as in its ``ahead``.
 
     It is one step of the integration to the next node, and the motion from there on.

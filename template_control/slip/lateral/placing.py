@@ -24,7 +24,7 @@ from template_control.slip.lateral.path import (
     LateralPath,
     acceleration,
     lateral_path,
-    look_ahead,
+    motion_ahead,
 )
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -215,7 +215,7 @@ def place(path: LateralPath, aim: LateralAim, time: float, com: Array, feet: Arr
     if not np.isfinite(path.section):
         nowhere = np.full(2, np.nan)
         return Placement(np.nan, np.nan, np.nan, np.nan, nowhere, nowhere)
-    motion = look_ahead(path, time)
+    motion = motion_ahead(path, time)
     landing, ahead, slope = 0.0, np.empty(2), np.empty(2)
     for row in range(3):
         total = motion[row, 0] * com[0] + motion[row, 1] * com[1]

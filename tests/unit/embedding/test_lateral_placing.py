@@ -25,7 +25,7 @@ from template_control.slip import (
     simulate_stride,
 )
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.lateral.path import look_ahead, transition
+from template_control.slip.lateral.path import motion_ahead, transition
 from template_control.slip.lateral.placing import LATERAL as KERNELS
 from template_control.slip.lateral.placing import before_turn, contact, pivot
 from template_control.slip.maps.section import APEX, VLO
@@ -145,7 +145,7 @@ def test_all_moved_aside_is_moved_aside(y, start):
 def test_what_is_ahead_is_the_same_from_a_node_on(share, stretch):
     path = lateral_path((STRIDE, STRIDE), P.gravity, stretch=stretch)
     time = share * path.section
-    ahead = look_ahead(path, time)
+    ahead = motion_ahead(path, time)
     np.testing.assert_allclose(ahead[1:], transition(path, time, path.section), atol=1e-5)
     landing = transition(path, time, max(time, path.touchdown))[0]
     np.testing.assert_allclose(ahead[0], landing, atol=1e-5)
