@@ -294,12 +294,6 @@ class Biped(Robot):
     def _prepare(self) -> None:
         """Make what :meth:`update` reads and writes."""
 
-    def _compute(self, q: Array, v: Array) -> None:
-        """Let Pinocchio compute all at (q, v)."""
-        pin.computeAllTerms(self.model, self._data, q, v)
-        # Without q: turns data.a = dJ/dt v into the CoM's bias.
-        pin.centerOfMass(self.model, self._data)
-
     def neutral(self) -> Array:
         """(nq,) upright, with straight vertical legs."""
         return self._neutral.copy()

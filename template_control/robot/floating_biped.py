@@ -268,7 +268,7 @@ class FloatingBaseBiped(Biped):
                 )
             q = q.copy()
             q[3:7] /= length
-        self._compute(q, v)
+        pin.computeAllTerms(self.model, self._data, q, v)
         if not gather_floating(self._kept, q, v):
             raise self._diverged(q, v)
 

@@ -136,7 +136,9 @@ class PlanarBiped(Biped):
         Raises:
             DivergedError: if a value is NaN or infinite.
         """
-        self._compute(q, v)
+        pin.computeAllTerms(self.model, self._data, q, v)
+        # Without q: turns data.a = dJ/dt v into the CoM's bias.
+        pin.centerOfMass(self.model, self._data)
         if not gather_planar(self._kept, q, v):
             raise self._diverged(q, v)
 

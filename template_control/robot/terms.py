@@ -361,28 +361,34 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     st.momentum_bias[0] = c * moment[0] + s * moment[1]
     st.momentum_bias[1] = c * moment[1] - s * moment[0]
     st.momentum_bias[2] = moment[2]
-    place, drift = np.empty(3), np.empty(PATCH)
+    place, drift, patches = np.empty(3), np.empty(PATCH), contact.shape[1] == PATCH
     for i in range(contact.shape[0]):
         move_point(points, i, place, drift)
         px, py, pz = place[0], place[1], place[2]
         x, y = px - frame[0], py - frame[1]
         st.contact_position[i, 0], st.contact_position[i, 1] = c * x + s * y, c * y - s * x
         st.contact_position[i, 2] = pz - r
+        speeds = st.contact_velocity[i]
+        speeds[:] = 0.0
         for k in range(nv):
+            if carries[i, k] == 0.0:
+                continue
             wx, wy, wz = jacobian[3, k], jacobian[4, k], jacobian[5, k]
             # Rolling without slip: the material point below the sphere's centre is at rest.
-            jx = (jacobian[0, k] + wy * (pz - r) - wz * py) * carries[i, k]
-            jy = (jacobian[1, k] + wz * px - wx * (pz - r)) * carries[i, k]
+            jx = jacobian[0, k] + wy * (pz - r) - wz * py
+            jy = jacobian[1, k] + wz * px - wx * (pz - r)
             contact[i, 0, k], contact[i, 1, k] = c * jx + s * jy, c * jy - s * jx
-            contact[i, 2, k] = (jacobian[2, k] + wx * py - wy * px) * carries[i, k]
+            contact[i, 2, k] = jacobian[2, k] + wx * py - wy * px
+            if patches:
+                contact[i, 3, k], contact[i, 4, k] = c * wx + s * wy, c * wy - s * wx
+                contact[i, 5, k] = wz
+            for row in range(contact.shape[1]):
+                speeds[row] += contact[i, row, k] * v[k]
         bx, by = drift[0] - r * drift[4], drift[1] + r * drift[3]
         st.contact_bias[i, 0], st.contact_bias[i, 1] = c * bx + s * by, c * by - s * bx
         st.contact_bias[i, 2] = drift[2]
-        if contact.shape[1] == PATCH:
-            _gather_patch(st, i, (jacobian, carries, drift), contact[i], frame, points)
-        moving = np.dot(contact[i], v)
-        for k in range(contact.shape[1]):
-            st.contact_velocity[i, k] = moving[k]
+        if patches:
+            _gather_patch(st, i, drift, frame, points)
     _gather_feet(st)
     for k in range(3):
         jturning[0, 3 + k] = c * rotation[0, k] + s * rotation[1, k]
@@ -397,25 +403,12 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
 
 
 @compiled
-def _gather_patch(
-    s: Any,
-    patch: int,
-    views: tuple[Array, Array, Array],
-    contact: Array,
-    frame: Array,
-    points: Any,
-) -> None:
-    """Write the angular rows of a patch, and its axes.
+def _gather_patch(s: Any, patch: int, drift: Array, frame: Array, points: Any) -> None:
+    """Write the angular drift of a patch, and its axes.
 
-    ``views`` are the joints' Jacobians, which of them move each contact, and the drift of this one;
-    ``points`` are of :func:`sources`.
+    ``drift`` is from :func:`move_point`, ``points`` are of :func:`sources`.
     """
-    jacobian, carries, drift = views
     c, sine = frame[2], frame[3]
-    for k in range(contact.shape[1]):
-        wx, wy = jacobian[3, k] * carries[patch, k], jacobian[4, k] * carries[patch, k]
-        contact[3, k], contact[4, k] = c * wx + sine * wy, c * wy - sine * wx
-        contact[5, k] = jacobian[5, k] * carries[patch, k]
     s.contact_bias[patch, 3] = c * drift[3] + sine * drift[4]
     s.contact_bias[patch, 4] = c * drift[4] - sine * drift[3]
     s.contact_bias[patch, 5] = drift[5]
@@ -441,7 +434,7 @@ def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any
     state.attitude[2] = np.arctan2(c2 * left - s2 * ahead, c2 * ahead + s2 * left)
     middle = np.zeros(3)
     for i in range(len(places)):
-        place, point = places[i], np.dot(axes[i], points[i])
+        place, point = places[i], turned(axes[i], points[i, 0], points[i, 1], points[i, 2])
         for k in range(3):
             middle[k] += place[k] + point[k]
     for k in range(3):
@@ -450,6 +443,6 @@ def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any
     state.hips[1] = c * (middle[1] - frame[1]) - s * (middle[0] - frame[0])
     state.hips[2] = middle[2]
     # The hips move with the trunk, whose origin is elsewhere.
-    moving = np.dot(rotation, v[:3])
+    moving = turned(rotation, v[0], v[1], v[2])
     level = c * moving[0] + s * moving[1] + state.turning[1] * (middle[2] - q[2])
     state.hip_speed = level - state.turning[2] * frame[4]
