@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Set
 from dataclasses import replace
+from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
@@ -338,8 +339,18 @@ class StrideSupervisor:
         strides, self.viable = self._rollout.strides(node, first, self.goal, now)
         self.path, self.feet = join(strides, self._rollout.scale.time), sensed.feet
         self._look_ahead(0)
+        if self._lets_go(node, state, sensed):
+            # On the path that leg pulls, which the template's cannot, and comes back to l0 later.
+            self.event_times[Event.REAR_LIFTOFF] = 0.0
         self.planned_at = now
         return node
+
+    def _lets_go(self, node: Node, state: Array, sensed: TemplateState) -> bool:
+        """True if the rear leg is beyond l0 already, on springs, and is to lift off."""
+        edge = node.edge(Event.REAR_LIFTOFF)
+        if edge is None or edge.target not in self.automaton.index or node.name in self.curved:
+            return False
+        return hypot(state[0] - sensed.toes[0], state[1]) > self.parameters.rest_length
 
     def time_of(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""

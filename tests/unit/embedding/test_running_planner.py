@@ -15,11 +15,18 @@ from template_control.embedding.planners.running import (
     RunningOptions,
     RunningPlanner,
 )
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.state import EstimatorState, TemplateState
+from template_control.embedding.supervisor import StrideSupervisor
+from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
+from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.control.stride_solver import solve_within_reach
+from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.route import SteadyRoute
 
 P = SlipParameters()
 OPTIONS = RunningOptions()
@@ -171,3 +178,19 @@ def test_of_the_strides_that_aim_at_less_the_nearest_is_taken():
     assert solve_within_reach(solve, z, aim, 0.35)[1][0] == pytest.approx(3.1)
     assert solve_within_reach(lambda goal: (goal, None), z, aim, 0.1)[1] is None
     assert asked == [3.4]
+
+
+@pytest.mark.parametrize(("ahead", "lets_go"), [(-0.004, False), (0.004, True)])
+def test_a_leg_beyond_its_rest_length_lets_go_at_once(planner, gait, ahead, lets_go):
+    """On a path from there it pulls, and would reach its rest length again 0.4 s later."""
+    supervisor = StrideSupervisor(SteadyRoute.of(gait), {"r": planner}, ReplanOptions())
+    start = TemplateState(APEX.state(gait.apex), np.zeros(2))
+    supervisor.begin(APEX)
+    supervisor.decide(APEX, start, 0.0, EstimatorState(load=1.0, trim=0.0, lean=0.0))
+    stride = simulate_stride(P, STRIDE_START["r"], start.state, supervisor.decision.controls)
+    down, *_, liftoff = (e for e in stride.events if e.event is not Event.APEX)
+    toe = down.state[0] + P.rest_length * np.cos(supervisor.decision.controls[0])
+    robot = TemplateState(liftoff.state + [ahead, 0.0, 0.0, 0.0], np.array([toe, toe]))
+    supervisor.replan(Cause.DEVIATION, AUTOMATON.node(liftoff.source), robot, 0.3, phase_time=0.3)
+    due = supervisor.time_of(Event.REAR_LIFTOFF)
+    assert due == 0.0 if lets_go else 0.0 < due < 0.01
