@@ -53,11 +53,11 @@ class OverFeet(BetweenFeet):
         """See :meth:`.BetweenFeet.to_liftoff`; the rear foot has no load left at the end."""
         (x, speed, _), (height, *_) = start.tolist()
         rate = float(np.sqrt(self.parameters.gravity / max(height, self.margin)))
+        moves = speed > _STILL * self.parameters.speed_unit
         # Once the capture point is past the foot that stays, the CoM is not thrown back again.
-        passes = speed > 0.0 and x + speed / rate > self.toes[1]
+        passes = moves and x + speed / rate > self.toes[1]
         longest = _PASSING * max(self.toes[1] - x, 0.0) / speed if passes else np.inf
-        moves = lands or speed > _STILL * self.parameters.speed_unit
-        shortest = 0.0 if moves else self.options.shift
+        shortest = 0.0 if lands or moves else self.options.shift
         return self._best(start, ends, lands, UNLOADING, (shortest, longest))
 
     def _best(
