@@ -57,8 +57,9 @@ class SwingOptions(Checked):
         drop_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
         leg_share: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
-        lag: the reference waits for a foot that is further behind it ahead than this [m]: one that
-            hips at their limits could not follow is not caught up with at once; None: it does not.
+        lag: the reference waits for a foot that is further from it than this, forward or back [m]:
+            one that hips at their limits could not follow is not caught up with at once; None: it
+            does not.
     """
 
     clearance: NotNegative = tuned(0.05, LENGTH)
@@ -194,13 +195,26 @@ def drop(f: Any, foot: int, x: Array, y: Array, dt: float) -> None:
 
 
 @compiled
-def furthest(share: float, hip: tuple[float, float], height: float, leg_length: float) -> float:
+def furthest(
+    share: float, hip: tuple[float, float], height: float, aside: float, leg_length: float
+) -> float:
     """The furthest x that a share of a straight leg's length reaches at a foot's height [m].
 
-    ``hip`` is x and y of the hip [m].
+    ``hip`` is x and y of the hip [m], ``aside`` how far the leg leans to a side [m].
     """
     below, reach = hip[1] - height, share * leg_length
-    return hip[0] + np.sqrt(max(reach * reach - below * below, 0.0))
+    return hip[0] + np.sqrt(max(reach * reach - below * below - aside * aside, 0.0))
+
+
+@compiled
+def level_reach(r: Any, foot: int, height: float) -> tuple[float, float]:
+    """y below the hip of a flat foot, and how far to either side of it its sole is level [m].
+
+    ``r`` is of ``ROBOT_DATA``, ``height`` the foot's [m]. Where the leg leans further, the ankle
+    is at its stop, and the sole tilts with it.
+    """
+    below = max(r.hips[UP] - r.ankle_height - height, 0.0)
+    return r.hips[1] + r.hip_aside[foot], r.leg_lean * below
 
 
 @compiled

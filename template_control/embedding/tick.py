@@ -39,6 +39,7 @@ from template_control.embedding.swing import (
     FEET,
     drop,
     furthest,
+    level_reach,
     meet_wall,
     quintic_step,
     spread_contacts,
@@ -290,7 +291,10 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
             wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
             swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
         hip = (r.hips[0] + r.toe_ahead, r.hips[UP] - r.ankle_height)
-        want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], r.leg_length)
+        aside = 0.0
+        if np.isfinite(r.leg_lean):
+            aside = r.foot_position[foot, _SIDE] - level_reach(r, foot, y[0])[0]
+        want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], aside, r.leg_length)
 
 
 @compiled
@@ -333,6 +337,9 @@ def _swing_sideways(t: Any, r: Any, want: Any, plan: tuple[Any, ...], dt: float)
         due, side = path.landing_time[foot] - path.time, want.side[foot]
         later = path.landing_time[foot] > first
         target = foothold + lateral.second_step if later else foothold
+        if np.isfinite(r.leg_lean):
+            middle, reach = level_reach(r, foot, want.foot[foot, 1, 0])
+            target = min(max(target, middle - reach), middle + reach)
         # Without a touchdown on the path there is no time in which to get there.
         if not f.horizon[foot] < due < np.inf or not np.isfinite(target):
             side[1] = side[2] = 0.0

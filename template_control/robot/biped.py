@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
+from math import inf, tan
 from pathlib import Path
 from typing import Self
 
@@ -35,6 +36,8 @@ MONOPOD = ((0,), ())
 """Groups of a robot with one leg: the front leg of the template has no contact."""
 
 _BENT = np.array([-0.4, 0.8, -0.4])  # of hip, knee and ankle [rad]
+_ABOUT = 0.9  # least cosine of the angle between a joint's axis and the one that it turns about
+_LEAN_SHARE = 0.9  # of the range to the side of a flat foot's leg that is used
 _KNEE = 1  # place among the hinges of a leg
 _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 
@@ -187,7 +190,7 @@ class Biped(Robot):
     def _take_patches(self) -> None:
         """Write what is constant of the soles."""
         now, data, model = self.data[0], self.model.createData(), self.model
-        now["sway"] = 1.0
+        now["sway"], now["leg_lean"] = 1.0, inf
         if not self.patches:
             return
         for i, patch in enumerate(self.patches):
@@ -199,6 +202,17 @@ class Biped(Robot):
             axis=0,
         )
         now["toe_ahead"], now["ankle_height"] = ahead, -below
+        places = np.array([data.oMf[toe].translation[1] for toe in self._foot_ids])
+        now["hip_aside"] = places - places.mean()
+        axes = np.abs(pin.computeJointJacobians(model, data, self._neutral)[3])
+        stops = [
+            abs(stop - self._neutral[model.idx_qs[j]])
+            for leg in self._leg_joints
+            for j in leg
+            if axes[model.idx_vs[j]] > _ABOUT
+            for stop in self.joint_range[j - 1 - self.base_joints]
+        ]
+        now["leg_lean"] = tan(_LEAN_SHARE * min(stops))
 
     def _look(self) -> None:
         """Take the views that Python reads; Pinocchio keeps its arrays in place."""

@@ -10,12 +10,14 @@ from template_control.embedding.swing import (
     begin_swing,
     drop,
     furthest,
+    level_reach,
     meet_wall,
     quintic_step,
     swing_step,
     wait,
 )
 from template_control.embedding.tick import TICK, move_swings
+from template_control.robot.library import load_floating_robot
 from template_control.robot.terms import ROBOT_DATA
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.task import References
@@ -101,9 +103,25 @@ def test_swing_without_a_foothold_comes_down():
 
 
 def test_swing_stays_within_reach_of_the_hip():
-    x = furthest(0.97, (0.2, 0.85), 0.1, 0.9)
-    assert np.hypot(x - 0.2, 0.75) == pytest.approx(0.97 * 0.9)
-    assert furthest(0.97, (0.2, 1.2), 0.1, 0.9) == 0.2, "nowhere but below the hip"
+    x = furthest(0.97, (0.2, 0.85), 0.1, 0.2, 0.9)
+    assert np.linalg.norm((x - 0.2, 0.75, 0.2)) == pytest.approx(0.97 * 0.9)
+    assert furthest(0.97, (0.2, 1.2), 0.1, 0.0, 0.9) == 0.2, "nowhere but below the hip"
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+@pytest.mark.parametrize("share", [-0.9, 0.9])
+def test_a_sole_is_level_as_far_to_the_side_as_the_ankle_leans(foot, share):
+    robot, names = load_floating_robot("g1"), ("left", "right")
+    lean = share * robot.joint_range[robot.joint_names.index(f"{names[foot]}_ankle_roll_joint"), 1]
+    q = robot.neutral()
+    for joint, angle in (("hip_roll", lean), ("ankle_roll", -lean)):
+        q[7 + robot.joint_names.index(f"{names[foot]}_{joint}_joint")] += angle
+    robot.update(q, np.zeros(robot.nv))
+    now = robot.data[0]
+    place = now["contact_position"][foot]
+    middle, reach = level_reach(now, foot, place[2])
+    assert now["contact_axes"][foot, 2] == pytest.approx((0.0, 0.0, 1.0), abs=0.02)
+    assert place[1] == pytest.approx(middle + np.sign(share) * reach, abs=0.01)
 
 
 def test_swing_falls_to_ground_that_comes_late():
