@@ -15,7 +15,7 @@ from typing import Any
 from template_control import settings
 from template_control.checks import option_types as values
 from template_control.cli.flags import ALL, GAIT, OWN_URDF, PLANNERS, STANDS, Flag
-from template_control.embedding.free.options import FREE_PLANNER
+from template_control.embedding.free.options import lqr_options
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.errors import ParameterError
@@ -144,4 +144,4 @@ def _planner(name: str, base: Experiment) -> Any:
         return OwnPlanner(name)
     if getattr(base.planner, "kind", None) == name:
         return base.planner
-    return FREE_PLANNER if base.free and name == LqrOptions.kind else PLANNERS[name]()
+    return lqr_options(base.tuning) if name == LqrOptions.kind else PLANNERS[name]()

@@ -17,9 +17,9 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.options import (
-    FREE_PLANNER,
     AnyOptions,
     default_options,
+    lqr_options,
     options_of_kind,
 )
 from template_control.embedding.options import EmbeddingOptions
@@ -207,11 +207,9 @@ class Experiment(Checked):
         runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
         if runs or isinstance(motion, RunningGait):
             return RunningOptions()
-        if self.free:
-            return FREE_PLANNER
-        if isinstance(motion, Scenario):
-            return AheadOptions() if motion.only_walks else LqrOptions()
-        return LqrOptions()
+        if isinstance(motion, Scenario) and motion.only_walks and not self.free:
+            return AheadOptions()
+        return lqr_options(self._kind())
 
     def with_(self, keys: Mapping[str, Any]) -> Experiment:
         """The same experiment with some keys set, named as in its TOML file.

@@ -325,3 +325,14 @@ Its swing leg has to move sideways too, and needs time. Its first steps from a s
 from the gait than a planar robot's, and the law of a slow gait is good in its neighbourhood only:
 at 0.4 m/s it led Bolt from an error of 2 mm to one of 0.1 m/s. So the search begins earlier.
 """
+
+# A heavy leg needs longer to get in front. After a step up a foot was to land 0.08 s after VLO
+# (l0 = 0.67 m); it landed next to the other one, and G1 fell.
+_SOLE_PLANNER = replace(FREE_PLANNER, earliest_touchdown=0.15, earliest_share=0.2)
+
+
+def lqr_options(options: EmbeddingOptions) -> LqrOptions:
+    """Tuning of the LQR planner for the kind of robot whose controller has these options."""
+    if isinstance(options, SoleOptions):
+        return _SOLE_PLANNER
+    return FREE_PLANNER if isinstance(options, FreeOptions) else LqrOptions()
