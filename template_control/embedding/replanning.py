@@ -234,7 +234,7 @@ def choose_all_controls(
         z = rollout.backward_to_section(s.node, so_far, s.sensed)
         if z is None:
             return None
-        return decided(planner.decide, Context(z, s.goal.target, angles, s.cause))
+        return decided(planner.decide, Context(z, s.goal.target, angles, s.cause, s.decision))
 
     decision = decide(s.decision.controls)
     if decision is not None and decision.feasible:

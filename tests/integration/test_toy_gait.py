@@ -139,7 +139,7 @@ class Deadbeat(Planner):
         self.offset = np.zeros(3)
 
     def decide(self, context):
-        z, target, angles, _ = context
+        z, target, angles, *_ = context
         aim = (self.gait.state if target is None else target) - self.offset[:2]
         low, high = np.maximum(angles[0], 1.3), np.minimum(angles[1], np.pi - 1.3)
 

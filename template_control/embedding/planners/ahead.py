@@ -32,7 +32,7 @@ from template_control.embedding.planners.look_ahead import (
     look_ahead,
 )
 from template_control.embedding.planners.lqr import KNEE_MOMENT, KNEE_STRAIGHT, LqrPlanner
-from template_control.embedding.planners.planner import ANY_ANGLE, Cause, Context, Decision, Planner
+from template_control.embedding.planners.planner import ANY_ANGLE, Context, Decision, Planner
 from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -145,7 +145,6 @@ class AheadPlanner(Planner):
             np.empty((o.steps, 3)),
             np.empty(WIDTH),
         )
-        self._aim: float | None = None  # of the present step's plan [m/s]
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._lead_to(self._first)
         self._lqr = LqrPlanner(self.gait)
@@ -162,7 +161,6 @@ class AheadPlanner(Planner):
 
     def reset(self) -> None:
         """See :class:`~.planner.Planner`."""
-        self._aim = None
         self._lead_to(self._first)
         self._lqr.reset()
         self.offset = self._lqr.offset
@@ -187,27 +185,24 @@ class AheadPlanner(Planner):
 
         The decision is nominal where a plan was cheap, whatever was accepted.
         """
-        z, target, angles, cause = context
+        z, target, angles, _, begun = context
         wanted = self._speed if target is None else float(target[0])
         low, high = self.speeds
         present = min(max(float(z[0]), low), high)
         pace, cheapest = self.options.pace, (np.inf, present)
         change = min(max(min(max(wanted, low), high) - present, -pace), pace)
         aims = [present + share * change for share in _SHARES]
-        if cause not in (Cause.SECTION, Cause.FUTURE) and self._aim is not None:
+        if begun is not None and begun.nominal:
             # The VLO from which the template would have come here has the speed that the legs'
             # swing adds for a while. A step goes on to where it went, as long as that is cheap.
-            aims.insert(0, self._aim)
+            aims.insert(0, wanted if begun.accepted is None else begun.accepted)
         for speed in aims:
             cost, excess = self._look(z, speed, angles)
             if excess <= self.options.cheap and cost <= (self.options.dearest or np.inf):
                 break
             cheapest = min(cheapest, (cost, speed))
         else:
-            self._aim = None
             return self._otherwise(z, wanted, cheapest, angles)
-        if cause is not Cause.FUTURE:
-            self._aim = speed
         return self._decision(speed, wanted, True)
 
     def _look(self, z: Array, speed: float, angles: tuple[float, float]) -> tuple[float, float]:

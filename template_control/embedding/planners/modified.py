@@ -75,7 +75,7 @@ class ModifiedPlanner(Planner):
 
     def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a walking step from VLO to VLO."""
-        z, target, angles, _ = context
+        z, target, angles, *_ = context
         self.gait, reachable = self._family.towards(self.gait, target)
         p, o = self.gait.parameters, self.options
         predicted = np.empty(3)

@@ -85,12 +85,14 @@ class Context(NamedTuple):
         target: (n,) state wanted at the section where the stride ends; None: the gait's own.
         angles: least and greatest touchdown angle that the swing foot can still reach [rad].
         cause: of the question.
+        decision: what holds so far, within a stride.
     """
 
     z: Array
     target: Array | None = None
     angles: tuple[float, float] = ANY_ANGLE
     cause: Cause = Cause.SECTION
+    decision: Decision | None = None
 
 
 class RestContext(NamedTuple):

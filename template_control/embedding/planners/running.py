@@ -144,7 +144,6 @@ class RunningPlanner(Planner):
         self._climb = _CLIMB * gait.parameters.rest_length
         self._miss = _MISS * self._scale.speed
         self._weights = np.diag(1.0 / (_TOLERANCE * self._scale.state[:2]))
-        self._arrives = False  # whether the present stride was to come to what was wanted
         # Compile now what a stride would otherwise wait for.
         self.decide(Context(gait.apex))
 
@@ -155,18 +154,16 @@ class RunningPlanner(Planner):
 
     def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
-        z, target, angles, cause = context
+        z, target, angles, cause, begun = context
         if target is not None and target[0] != self.gait.apex[0]:
             self.gait = self._family.at(float(target[0]))
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
         goal, at_target = self._aim(z, wanted)
-        if cause is Cause.TOUCHDOWN and self._arrives:
+        if cause is Cause.TOUCHDOWN and begun is not None and begun.nominal:
             # What the legs' swing adds to the speed as a foot lands is in the apex from which the
             # template would have come there, and takes no pace: the stride goes where it went.
             goal, at_target = wanted - self.offset[:2], True
-        elif cause is not Cause.FUTURE:
-            self._arrives = at_target
         o, length, legs = self.options, near.parameters.rest_length, near.controls[: len(_SLOTS)]
         reach = float(angles[0]), float(angles[1])
         table = leg_bounds(z, legs, reach, length, o.change, o.stiffness_range)

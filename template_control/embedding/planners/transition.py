@@ -131,7 +131,7 @@ class TransitionPlanner(Planner):
 
     def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`."""
-        z, target, angles, _ = context
+        z, target, angles, *_ = context
         if target is not None and target[0] != self.gait.state[0]:
             self.gait = self._after(float(target[0]))
         wanted = self.gait.state if target is None else target

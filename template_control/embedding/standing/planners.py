@@ -131,7 +131,7 @@ class CurvePlanner(Planner):
 
     def decide(self, context: Context) -> Decision:
         """See :class:`~.planner.Planner`; what depends on the feet, ``curve`` chooses."""
-        z, target, angles, _ = context
+        z, target, angles, *_ = context
         if not self._lands:
             if self._rests or target is None:
                 target = self.gait.state

@@ -213,7 +213,8 @@ def test_a_step_goes_on_to_where_it_went(planner, cause):
     wanted, seems = z - [0.5, 0.0, 0.0], z + [0.04, 0.0, 0.0]
     began = planner.decide(Context(z, wanted))
     planner.decide(Context(began.predicted, wanted, cause=Cause.FUTURE))
-    assert planner.decide(Context(seems, wanted, cause=cause)).accepted == began.accepted
+    goes_on = planner.decide(Context(seems, wanted, cause=cause, decision=began))
+    assert goes_on.accepted == began.accepted
     assert planner.decide(Context(seems, wanted)).accepted > began.accepted
 
 

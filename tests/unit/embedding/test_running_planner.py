@@ -104,11 +104,11 @@ def test_after_touchdown_only_the_stiffnesses_are_free(planner, gait):
 
 
 def test_a_foot_that_lands_changes_no_aim(planner, gait):
-    planner.decide(Context(gait.apex))
+    begun = planner.decide(Context(gait.apex))
     # As it lands, the legs' swing adds more to the speed than the pace is.
     z, angle = gait.apex + [0.3, 0.0], gait.controls[Slot.TOUCHDOWN_ANGLE]
     landed, pushed = (
-        planner.decide(Context(z, None, (angle, angle), cause))
+        planner.decide(Context(z, None, (angle, angle), cause, begun))
         for cause in (Cause.TOUCHDOWN, Cause.DEVIATION)
     )
     assert landed.nominal
