@@ -53,11 +53,9 @@ def test_go2_stands_trots_and_stands_again():
 
 
 @pytest.mark.slow(seconds=8)
-def test_g1_stands_runs_and_stands_again_in_mujoco():
-    """With its feet as far apart as in the walk, it turns until it falls in the run."""
+def test_g1_stands_runs_and_stands_again():
     given = tc.Experiment.load(EXAMPLES / "zero_run_zero.toml")
-    robot = tc.robot.RobotSpec("g1", free=True)
-    record = tc.simulate(replace(given, robot=robot, world=tc.MujocoOptions()))
+    record = tc.simulate(replace(given, robot=tc.robot.RobotSpec("g1", free=True)))
     assert record.fall_reason == ""
     speed = record.section_state[:, 0]
     runs = [stride == "r" for stride in record.kinds_of_stride]
