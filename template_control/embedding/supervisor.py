@@ -38,6 +38,11 @@ Array = NDArray[np.float64]
 
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
+_JUST_BEYOND = 1.002
+"""Length of a leg over l0 up to which a path that begins lets it go at once. One that is extended
+further is being pushed off and soon overstretched: where it was let go before, `five-link`'s trunk
+turned over in the flight of a walk that broke into a run.
+"""
 
 
 class StrideSupervisor:
@@ -346,11 +351,12 @@ class StrideSupervisor:
         return node
 
     def _lets_go(self, node: Node, state: Array, sensed: TemplateState) -> bool:
-        """True if the rear leg is beyond l0 already, on springs, and is to lift off."""
+        """True if the rear leg is just beyond l0, on springs, and is to lift off."""
         edge = node.edge(Event.REAR_LIFTOFF)
         if edge is None or edge.target not in self.automaton.index or node.name in self.curved:
             return False
-        return hypot(state[0] - sensed.toes[0], state[1]) > self.parameters.rest_length
+        length = hypot(state[0] - sensed.toes[0], state[1])
+        return 1.0 < length / self.parameters.rest_length < _JUST_BEYOND
 
     def time_of(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
