@@ -196,14 +196,14 @@ def drop(f: Any, foot: int, x: Array, y: Array, dt: float) -> None:
 
 @compiled
 def furthest(
-    share: float, hip: tuple[float, float], height: float, aside: float, leg_length: float
+    share: float, hip: tuple[float, float], height: float, sideways: float, leg_length: float
 ) -> float:
     """The furthest x that a share of a straight leg's length reaches at a foot's height [m].
 
-    ``hip`` is x and y of the hip [m], ``aside`` how far the leg leans to a side [m].
+    ``hip`` is x and y of the hip [m], ``sideways`` how far the leg leans to a side [m].
     """
     below, reach = hip[1] - height, share * leg_length
-    return hip[0] + np.sqrt(max(reach * reach - below * below - aside * aside, 0.0))
+    return hip[0] + np.sqrt(max(reach * reach - below * below - sideways * sideways, 0.0))
 
 
 @compiled
@@ -214,7 +214,7 @@ def level_reach(r: Any, foot: int, height: float) -> tuple[float, float]:
     is at its stop, and the sole tilts with it.
     """
     below = max(r.hips[UP] - r.ankle_height - height, 0.0)
-    return r.hips[1] + r.hip_aside[foot], r.leg_lean * below
+    return r.hips[1] + r.hip_side[foot], r.leg_lean * below
 
 
 @compiled

@@ -291,10 +291,10 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
             wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
             swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
         hip = (r.hips[0] + r.toe_ahead, r.hips[UP] - r.ankle_height)
-        aside = 0.0
+        sideways = 0.0
         if np.isfinite(r.leg_lean):
-            aside = r.foot_position[foot, _SIDE] - level_reach(r, foot, y[0])[0]
-        want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], aside, r.leg_length)
+            sideways = r.foot_position[foot, _SIDE] - level_reach(r, foot, y[0])[0]
+        want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], sideways, r.leg_length)
 
 
 @compiled

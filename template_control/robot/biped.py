@@ -203,7 +203,7 @@ class Biped(Robot):
         )
         now["toe_ahead"], now["ankle_height"] = ahead, -below
         places = np.array([data.oMf[toe].translation[1] for toe in self._foot_ids])
-        now["hip_aside"] = places - places.mean()
+        now["hip_side"] = places - places.mean()
         axes = np.abs(pin.computeJointJacobians(model, data, self._neutral)[3])
         stops = [
             abs(stop - self._neutral[model.idx_qs[j]])

@@ -49,7 +49,7 @@ ROBOT_DATA = np.dtype(
         ("leg_length", _F),  # from hip to the foot sphere's centre with a straight knee [m]
         ("toe_ahead", _F),  # of the ankle, of flat feet; 0 of point feet [m]
         ("ankle_height", _F),  # over a sole, of flat feet; 0 of point feet [m]
-        ("hip_aside", _F, (LEGS,)),  # y of a flat foot below its hip, from the hips' middle [m]
+        ("hip_side", _F, (LEGS,)),  # y of a flat foot below its hip, from the hips' middle [m]
         ("leg_lean", _F),  # to a side with a level sole: tangent of the angle; inf of point feet
         ("sway", _F),  # speed of the CoM to the left over that with the momentum; 1 of point feet
         ("contacts", _I),  # number of points that may touch the ground
