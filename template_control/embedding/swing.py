@@ -25,7 +25,7 @@ from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
-from template_control.robot.terms import MOST_CONTACTS, UP
+from template_control.robot.terms import MOST_CONTACTS, UP, onward
 from template_control.slip.automaton.vocabulary import Reset
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, Scale, scaled, tuned
@@ -214,7 +214,7 @@ def level_reach(r: Any, foot: int, height: float) -> tuple[float, float]:
     is at its stop, and the sole tilts with it.
     """
     below = max(r.hips[UP] - r.ankle_height - height, 0.0)
-    return r.hips[1] + r.hip_side[foot], r.leg_lean * below
+    return r.hips[1] + onward(r.facing) * r.hip_side[foot], r.leg_lean * below
 
 
 @compiled

@@ -46,7 +46,7 @@ from template_control.embedding.swing import (
     swing_step,
     wait,
 )
-from template_control.robot.terms import LEGS, UP
+from template_control.robot.terms import LEGS, UP, onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.task_rows import write_rows
@@ -290,7 +290,7 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
                 foothold = rolled(foothold, path.touchdown_angle, r.foot_radius)
             wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
             swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
-        hip = (r.hips[0] + r.toe_ahead, r.hips[UP] - r.ankle_height)
+        hip = (r.hips[0] + onward(r.facing) * r.toe_ahead, r.hips[UP] - r.ankle_height)
         sideways = 0.0
         if np.isfinite(r.leg_lean):
             sideways = r.foot_position[foot, _SIDE] - level_reach(r, foot, y[0])[0]

@@ -236,7 +236,7 @@ def gather_joints(
 
 @compiled
 def onward(facing: float) -> float:
-    """1 of a planar robot that goes where its trunk faces; -1 of one that goes backward."""
+    """1 of a robot that goes where its trunk faces; -1 of one that goes backward."""
     return 1.0 if np.cos(facing) > 0.0 else -1.0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import atan2, hypot, nan
+from math import atan2, hypot, nan, pi
 from typing import ClassVar
 
 import numpy as np
@@ -54,6 +54,9 @@ Velocity = tuple[float, float, float]
 """Forward and to the left [m/s], and turning to the left [rad/s], in the heading frame."""
 
 
+_BACKWARD = 0.19
+"""Fastest mean speed backward over sqrt(g l0): 0.6 m/s for l0 = 1 m, as planar robots walked."""
+
 # Bolt and five-link-3d kept them, and changes between them, for 40 s.
 _LEFT = 0.03  # of sqrt(g l0)
 _TURNING = 0.1  # of sqrt(g / l0)
@@ -65,7 +68,7 @@ class VelocityProfile(Checked):
 
     The motion of an :class:`~template_control.run.Experiment`: the robot moves at any speed of its
     gaits. Footholds and heading follow from one step to the next; the forward speed
-    changes as fast as the planner finds steps. Planar robots and quadrupeds go backward too, at a
+    changes as fast as the planner finds steps. Robots that can stand go backward too, at a
     negative speed: they stop, and start the other way.
 
     Attributes:
@@ -170,6 +173,7 @@ class VelocityRange:
         left: largest speed to the left and to the right [m/s]; 0 of a planar robot.
         turning: largest rate of the heading to both sides [rad/s]; 0 of a planar robot.
         stands: whether it can stand, at the speed 0.
+        backward: fastest mean speed backward [m/s]; 0 of one that cannot stand in between.
         run: fastest speed of its runs [m/s]; 0 where it does not run.
     """
 
@@ -179,6 +183,7 @@ class VelocityRange:
     turning: float = 0.0
     stands: bool = True
     run: float = 0.0
+    backward: float = 0.0
 
     @classmethod
     def of(cls, robot: Biped) -> VelocityRange:
@@ -199,10 +204,12 @@ class VelocityRange:
         first = min(max(round(default_gait(robot).mean_speed, 2), speeds[0]), speeds[1])
         unit = p.speed_unit
         run = round(_FASTEST_RUN * unit, 2) if can_run(robot) else 0.0
+        stands = can_stand(robot)
+        backward = round(_BACKWARD * unit, 2) if stands else 0.0
         if not isinstance(robot, FloatingBaseBiped):
-            return cls(speeds, first, run=run)
+            return cls(speeds, first, run=run, backward=backward)
         left, turning = round(_LEFT * unit, 2), round(_TURNING * p.gravity / unit, 2)
-        return cls(speeds, first, left, turning, can_stand(robot), run)
+        return cls(speeds, first, left, turning, stands, run, backward)
 
     @property
     def gaits(self) -> tuple[Gait, ...]:
@@ -215,7 +222,7 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
     """Where a robot is to go.
 
     One on pairs of feet, or held in its plane, goes along the velocity, and its trunk faces
-    elsewhere.
+    elsewhere. One on two flat feet goes so backward only: to the left it places its feet.
 
     Args:
         velocity: the commanded.
@@ -223,19 +230,21 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
         robot: which goes.
     """
     forward, left, turning = velocity.at(time)
-    if not _faces(robot):
-        return Course(left, turning)
-    return Course(0.0, turning, -atan2(left, forward) if forward or left else nan)
+    if not _places(robot):
+        return Course(0.0, turning, -atan2(left, forward) if forward or left else nan)
+    if forward < 0.0:
+        return Course(-left, turning, pi)
+    return Course(left, turning, 0.0 if forward else nan)
 
 
-def _faces(robot: Biped) -> bool:
-    """Whether a robot can face away from its course."""
-    return robot.paired or not isinstance(robot, FloatingBaseBiped)
+def _places(robot: Biped) -> bool:
+    """Whether a robot goes to the left by where it places its feet, and along its course else."""
+    return isinstance(robot, FloatingBaseBiped) and not robot.paired
 
 
 def _slowest(robot: Biped) -> float:
     """Mean speed over sqrt(g l0) of the slowest walk that a robot is commanded, 0 where any is."""
-    if _faces(robot):
+    if not _places(robot):
         return 0.0
     return _SLOWEST_ON_SOLES if robot.patches else _SLOWEST_ON_POINTS
 
@@ -254,10 +263,10 @@ def check_direction(
         )
     if forward >= 0.0:
         return
-    if not _faces(robot):
+    if not can_stand(robot):
         raise ParameterError(
-            f"{robot.name} does not go backward, which planar robots and those on four feet do:"
-            " command it a speed of 0 or more"
+            f"{robot.name} does not go backward, as it cannot stand in between: command it a speed"
+            " of 0 or more"
         )
     if "stand" not in gaits:
         raise ParameterError(
@@ -293,11 +302,12 @@ def velocity_route(
     def forward(time: float) -> float:
         speed, *others = velocity.at(time)
         check_direction(robot, motion.gaits, speed, *others)
-        if not _faces(robot):
-            stands = "stand" in motion.gaits and speed < 0.5 * slowest
-            return 0.0 if stands else max(speed, slowest)
-        course = course_at(velocity, time, robot)
-        return 0.0 if course.turns_round(robot) else hypot(speed, others[0])
+        if course_at(velocity, time, robot).turns_round(robot):
+            return 0.0
+        if not _places(robot):
+            return hypot(speed, others[0])
+        stands = "stand" in motion.gaits and abs(speed) < 0.5 * slowest
+        return 0.0 if stands else max(abs(speed), slowest)
 
     if "stand" in motion.gaits and not can_stand(robot):
         raise ParameterError(

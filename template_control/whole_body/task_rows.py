@@ -185,7 +185,8 @@ def sole_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
     contact, foot = arrays[4], want.feet[task.leg]
     patch, nv = r.group[foot, 0], contact.shape[2]
     axes = r.contact_axes[patch]
-    c, s = np.cos(want.lean[2]), np.sin(want.lean[2])
+    yaw = r.facing + want.lean[2]
+    c, s = np.cos(yaw), np.sin(yaw)
     for axis in range(3):
         i, j = (axis + 1) % 3, (axis + 2) % 3
         # The rotation times the inverse of the wanted one, a turn about the vertical.

@@ -116,7 +116,25 @@ def test_five_link_walks_backward_and_forward_from_and_to_a_stand():
     assert record.summary.qp_failures == 0
 
 
-def test_a_biped_does_not_go_backward():
+@pytest.mark.slow(seconds=6)
+def test_g1_walks_backward_and_to_the_left_from_and_to_a_stand():
+    rows = ((0.0, 0.0, 0.0, 0.0), (0.2, -0.5, 0.05, 0.0), (6.0, 0.0, 0.0, 0.0))
+    motion = VelocityProfile(rows, duration=7.5, foreseen=False, gaits=("stand", "walk"))
+    record = tc.simulate(tc.Experiment(tc.load_floating_robot("g1"), motion))
+    assert isinstance(record, tc.run.FloatingRecord)
+    assert not record.fell
+    # Over four steps on the gait: the CoM sways from foot to foot.
+    begun = record.section_time[[3, 7]]
+    ahead, left = np.diff(record.space_com[np.searchsorted(record.time, begun), :2], axis=0)[0]
+    assert ahead / np.diff(begun)[0] == pytest.approx(-0.5, abs=0.05)
+    assert left / np.diff(begun)[0] == pytest.approx(0.05, abs=0.02)
+    assert record.section_course[3:7, 3] == pytest.approx(np.pi)
+    assert abs(record.section_state[-1, 0]) < 0.01
+    assert np.abs(record.attitude).max() < 0.15
+    assert record.summary.qp_failures == 0
+
+
+def test_a_biped_on_points_does_not_go_backward():
     motion = VelocityProfile(((0.0, -0.5, 0.0, 0.0),), duration=1.0)
     with pytest.raises(tc.TemplateControlError, match="does not go backward"):
         tc.simulate(tc.Experiment(tc.load_floating_robot("bolt"), motion))

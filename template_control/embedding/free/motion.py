@@ -28,10 +28,11 @@ from template_control.embedding.state import TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet
 from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.terms import onward
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.lateral.gait import LateralWish
+from template_control.slip.lateral.gait import LateralWish, Side
 from template_control.slip.lateral.path import LateralPath
 from template_control.slip.lateral.placing import LATERAL, LateralAim
 from template_control.slip.maps.section import APEX, REST, Section
@@ -126,6 +127,14 @@ class LateralMotion:
         """y of a foot [m]."""
         return float(self.robot.space.foot_position[foot, _SIDE])
 
+    def _side(self, foot: int) -> Side:
+        """Side of the course that a foot is on: a robot that goes backward faces away from it.
+
+        Diagonal pairs of feet have no side, whichever way the trunk faces.
+        """
+        side = SIDES[foot]
+        return side if self.robot.paired or onward(self.robot.facing) > 0.0 else side.other
+
     def _stands(self, foot: int) -> None:
         """A foot stands where it is now."""
         self._stood[foot] = self.robot.space.foot_position[foot, :2]
@@ -140,7 +149,7 @@ class LateralMotion:
         planner, stance = self.planner, self._feet.landed
         about = self._stood[stance].copy()
         if nominal:
-            planner.end_step(SIDES[stance], about[_SIDE], com)
+            planner.end_step(self._side(stance), about[_SIDE], com)
         turn, turns = planner.wish.turn, self._turns
         if section is REST:
             turns = course.away(self.robot)
@@ -198,7 +207,7 @@ class LateralMotion:
         left, turn, self._turns = (gait.step_duration * self._now).tolist()
         planner.wish = replace(planner.wish, left=left, turn=turn - self._turns)
         planner.walk(gait)
-        planner.aim(SIDES[self._feet.landed], turned=True)
+        planner.aim(self._side(self._feet.landed), turned=True)
         z, target = supervisor.reports[-1].state, supervisor.goal.target
 
         def decide(least: float) -> Decision:
@@ -245,7 +254,7 @@ class LateralMotion:
         planner.wish = LateralWish(width, left)
         planner.walk(gait)
         self._turn_trunk(1.0, 0.0)
-        planner.aim(SIDES[self._feet.landed])
+        planner.aim(self._side(self._feet.landed))
         planner.expect(supervisor.time_of(Event.TOUCHDOWN))
         return node
 
@@ -264,7 +273,7 @@ class LateralMotion:
         """A foot has landed, ``lasted`` [s] after the section."""
         self.planner.touch_down(lasted)
         self._stands(foot)
-        self.planner.aim(SIDES[foot])
+        self.planner.aim(self._side(foot))
 
     def lift(self, foot: int) -> None:
         """A foot begins its swing."""

@@ -74,6 +74,7 @@ def test_a_robot_is_commanded_what_it_can():
     assert free.speeds[0] == pytest.approx(route.next(VLO, route.start, 0.0).wanted_speed, abs=0.01)
     assert (planar.gaits, planar.run) == (("stand", "walk", "run"), 3.01)
     assert (free.gaits, free.run) == (("walk", "run"), 1.8)
+    assert (planar.backward, free.backward) == (0.6, 0.0)
     assert VelocityRange.of(tc.load_robot("rabbit")).gaits == ("stand", "walk")
 
 
