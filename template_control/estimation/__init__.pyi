@@ -1,6 +1,6 @@
+from .base_filter import BaseFilterOptions as BaseFilterOptions
 from .delay import DelayCompensation as DelayCompensation
 from .delay import DelayOptions as DelayOptions
-from .filters import BaseFilterOptions as BaseFilterOptions
 from .filters import JointFilterOptions as JointFilterOptions
 from .filters import NoiseFilter as NoiseFilter
 from .filters import NoiseFilterOptions as NoiseFilterOptions

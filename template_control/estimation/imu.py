@@ -10,18 +10,13 @@ from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
-from template_control.estimation.filters import (
-    BaseFilter,
-    BaseFilterOptions,
-    JointFilter,
-    JointFilterOptions,
-)
+from template_control.estimation.base_filter import BaseFilter, BaseFilterOptions, trunk_frame
+from template_control.estimation.filters import JointFilter, JointFilterOptions
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import Scale, scaled
 
 Array = NDArray[np.float64]
-
-_PITCH = 2
 
 
 class Readings(NamedTuple):
@@ -29,14 +24,15 @@ class Readings(NamedTuple):
 
     Attributes:
         joints: (nu,) angles of the encoders [rad].
-        pitch_rate: of the trunk, from the gyro, forward positive [rad/s].
-        specific_force: (2,) from the accelerometer, forward and up along the trunk: its
-            acceleration less gravity, mean since the tick before [m/s^2].
-        contact: (2,) whether each foot touches the ground.
+        turning: (a,) angular velocity of the trunk, from the gyro: in the plane pitch, forward
+            positive, in space about the trunk's axes [rad/s].
+        specific_force: (d,) from the accelerometer, forward, in space to the left, and up along the
+            trunk: its acceleration less gravity, mean since the tick before [m/s^2].
+        contact: (n,) whether each contact touches the ground.
     """
 
     joints: Array
-    pitch_rate: float
+    turning: Array
     specific_force: Array
     contact: NDArray[np.bool_]
 
@@ -62,18 +58,19 @@ class StateEstimator:
         options: the noise.
     """
 
-    def __init__(self, robot: PlanarBiped, options: EstimatorOptions) -> None:
+    def __init__(self, robot: PlanarBiped | FloatingBaseBiped, options: EstimatorOptions) -> None:
         self._joints = JointFilter(options.joints)
         self._base = BaseFilter(robot, options.base)
+        self._nu = len(robot.joint_names)
 
     def reset(self, q: Array, v: Array) -> None:
         """Reset to a known state.
 
         Args:
-            q: (nv,) configuration [m, rad].
+            q: (nq,) configuration [m, rad].
             v: (nv,) velocity [m/s, rad/s].
         """
-        self._joints.reset(q[3:], v[3:])
+        self._joints.reset(q[-self._nu :], v[-self._nu :])
         self._base.reset(q, v)
 
     def update(self, readings: Readings, acceleration: Array, dt: float) -> tuple[Array, Array]:
@@ -85,27 +82,28 @@ class StateEstimator:
             dt: since then [s]; 0 at the first tick.
 
         Returns:
-            (nv,) configuration and (nv,) velocity.
+            (nq,) configuration and (nv,) velocity.
         """
         joints, base = self._joints, self._base
         if dt > 0.0:
-            joints.update(readings.joints, acceleration[3:], dt)
-            base.predict(readings.pitch_rate, readings.specific_force, dt)
+            joints.update(readings.joints, acceleration[-self._nu :], dt)
+            base.predict(readings.turning, readings.specific_force, dt)
         base.correct(joints.angle, readings.contact)
-        q = np.concatenate((base.state[:3], joints.angle))
-        return q, np.concatenate((base.state[3:5], [base.pitch_rate], joints.speed))
+        q = np.concatenate((base.base, joints.angle))
+        return q, np.concatenate((base.rates, joints.speed))
 
 
 @dataclass(frozen=True)
 class ImuOptions(Checked):
     """Sensing by encoders, a trunk IMU and contacts: the controller gets a state estimate.
 
-    The IMU sits where the legs hang. Noise is white and Gaussian, drawn anew at every tick.
+    The IMU sits at the origin of the trunk: in the plane where the legs hang. Noise is white and
+    Gaussian, drawn anew at every tick.
 
     Attributes:
         encoder_noise: standard deviation of a joint's angle [rad].
-        gyro_noise: of the pitch rate [rad/s].
-        accelerometer_noise: of either component of the specific force [m/s^2].
+        gyro_noise: of a component of the angular velocity [rad/s].
+        accelerometer_noise: of a component of the specific force [m/s^2].
         seed: of the draws.
         contact_errors: share of contact flags that are wrong
             (:class:`~template_control.run.sensing.ContactSensors`).
@@ -135,10 +133,14 @@ class ImuSensors:
     exact = False
 
     def __init__(
-        self, options: ImuOptions, robot: PlanarBiped, scale: Scale, time_step: float
+        self,
+        options: ImuOptions,
+        robot: PlanarBiped | FloatingBaseBiped,
+        scale: Scale,
+        time_step: float,
     ) -> None:
         self._options = options
-        self._robot = robot
+        self._robot, self._trunk = robot, trunk_frame(robot)
         self._estimator = StateEstimator(robot, scaled(options.estimator, scale))
         self._draws = np.random.default_rng(options.seed)
         self._dt = time_step
@@ -160,16 +162,17 @@ class ImuSensors:
         self._expected = acceleration
 
     def _read(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> Readings:
-        o, draws = self._options, self._draws
+        o, draws, trunk, d = self._options, self._draws, self._trunk, self._robot.directions
         assert self._before is not None
         old_q, old_v = self._before
-        acceleration = (v[:_PITCH] - old_v[:_PITCH]) / self._dt + (0.0, self._robot.gravity)
-        pitch = 0.5 * (q[_PITCH] + old_q[_PITCH])
-        sine, cosine = np.sin(pitch), np.cos(pitch)
-        turn = np.array([[cosine, -sine], [sine, cosine]])  # from the world into the trunk
+        change = trunk.velocity_axes(q) @ v[:d] - trunk.velocity_axes(old_q) @ old_v[:d]
+        acceleration = change / self._dt
+        acceleration[-1] += self._robot.gravity
+        force = trunk.middle(old_q, q).T @ acceleration
+        nu = len(self._robot.joint_names)
         return Readings(
-            joints=q[3:] + o.encoder_noise * draws.standard_normal(len(q) - 3),
-            pitch_rate=float(v[_PITCH] + o.gyro_noise * draws.standard_normal()),
-            specific_force=turn @ acceleration + o.accelerometer_noise * draws.standard_normal(2),
+            joints=q[-nu:] + o.encoder_noise * draws.standard_normal(nu),
+            turning=v[d : d + trunk.axes] + o.gyro_noise * draws.standard_normal(trunk.axes),
+            specific_force=force + o.accelerometer_noise * draws.standard_normal(d),
             contact=contact,
         )

@@ -272,6 +272,12 @@ class FloatingBaseBiped(Biped):
         if not gather_floating(self._kept, q, v):
             raise self._diverged(q, v)
 
+    @property
+    def foot_rotation(self) -> Array:
+        """(n, 3, 3) of each foot, to the world, at the last :meth:`update`."""
+        joints = [self.model.frames[foot].parentJoint for foot in self._foot_ids]
+        return np.array([self._data.oMi[joint].rotation for joint in joints])
+
     def face(self, heading: float, origin: Array) -> None:
         """Put the heading frame somewhere; takes effect at the next :meth:`update`.
 

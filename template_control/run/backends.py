@@ -36,12 +36,12 @@ from template_control.run.sensing import (
     FilteredSensors,
     ForeseeingSensors,
     Senses,
-    SensorOptions,
     Sensors,
 )
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import APEX, REST, VLO
+from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
 Array = NDArray[np.float64]
@@ -120,9 +120,7 @@ class PlanarBackend(RobotBackend):
         """See :meth:`RobotBackend.senses`."""
         parameters = controller.parameters
         if isinstance(o.sensors, ImuOptions):
-            # The controller's own model may be turned round.
-            own = self.robot.changed()
-            return ImuSensors(o.sensors, own, Scale.of(parameters), o.world.time_step)
+            return _imu(o, o.sensors, self.robot, parameters)
         delay = DelayCompensation(controller.options.delay, self.robot, o.world.time_step)
         sensors = Sensors(o.sensors, self.robot, parameters)
         return ForeseeingSensors(sensors, delay)
@@ -130,6 +128,16 @@ class PlanarBackend(RobotBackend):
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
         """See :meth:`RobotBackend.force`: what holds the robot bears the rest."""
         return (along,)
+
+
+def _imu(
+    o: Experiment,
+    options: ImuOptions,
+    robot: PlanarBiped | FloatingBaseBiped,
+    parameters: SlipParameters,
+) -> ImuSensors:
+    """The state that is estimated, on a model of its own: the controller's may be turned."""
+    return ImuSensors(options, robot.changed(), Scale.of(parameters), o.world.time_step)
 
 
 _REAR = 0  # the left foot stands where a run begins
@@ -246,12 +254,9 @@ class FloatingBackend(RobotBackend):
         )
 
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
-        """See :meth:`RobotBackend.senses`: noise is filtered; estimating the state is refused."""
-        if not isinstance(o.sensors, SensorOptions):
-            raise ParameterError(
-                f"{self.robot.name} has a floating base, and the estimate is that of a planar"
-                " robot: give SensorOptions"
-            )
+        """See :meth:`RobotBackend.senses`: noise is filtered."""
+        if isinstance(o.sensors, ImuOptions):
+            return _imu(o, o.sensors, self.robot, controller.parameters)
         sensors = Sensors(o.sensors, self.robot, controller.parameters)
         options = controller.options
         tuning = options.noise_filter if isinstance(options, FreeOptions) else None
