@@ -20,7 +20,7 @@ from template_control.robot.legs import (
     middle,
     straight_legs,
 )
-from template_control.robot.requirements import add_feet, check_size
+from template_control.robot.requirements import add_feet, check_size, feet_of_legs
 from template_control.robot.robot import Robot
 from template_control.robot.sole import Patch
 from template_control.robot.terms import UP, sources
@@ -274,16 +274,22 @@ class Biped(Robot):
         return leg_means(values, self.groups)
 
     def changed(
-        self, gravity: float | None = None, masses: Mapping[str, float] | None = None
+        self,
+        gravity: float | None = None,
+        masses: Mapping[str, float] | None = None,
+        groups: Sequence[Sequence[int]] = (),
     ) -> Self:
-        """The same robot under another gravity, or with other masses of its links.
+        """The same robot under another gravity, with other masses, or other groups of its feet.
 
         Args:
             gravity: [m/s^2]; None: as it is.
             masses: by link [kg]; their inertias grow alike.
+            groups: the feet of each of the template's legs, by their places in ``feet``; none: as
+                they are.
 
         Raises:
-            RobotError: if it has no such link, or one that weighs nothing.
+            RobotError: if it has no such link, or one that weighs nothing, or the groups are not
+                each foot once.
         """
         urdf, model = self.urdf, self.model.copy()
         if masses:
@@ -296,7 +302,8 @@ class Biped(Robot):
                 add_feet(self.path, urdf, model, self.feet)
         model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
         rest = self.feet, self.foot_radius, self.walk
-        same = {"groups": self.groups, "patches": self.patches}
+        legs = feet_of_legs(self.path, model, self.feet, groups) if groups else self.groups
+        same = {"groups": legs, "patches": self.patches}
         return type(self)(self.path, urdf, model, *rest, **same)  # type: ignore[arg-type]
 
     @staticmethod

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from template_control.checks.checked import Checked
-from template_control.checks.ranges import Positive
+from template_control.checks.ranges import Index, Positive
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
@@ -51,6 +51,9 @@ class RobotSpec(Checked):
         masses: of links by name, instead of the URDF's [kg]; their inertias grow alike.
         flat_feet: whether a free robot stands on soles, as its feet's collision shapes have them;
             joints that are in no leg are then locked.
+        groups: the feet of each of the template's two legs, by their places in the robot's
+            ``feet``: those of a quadruped are its diagonal pairs, with which it trots, if not
+            given; with the pairs of its sides it paces.
     """
 
     model: str = "five-link"
@@ -64,6 +67,7 @@ class RobotSpec(Checked):
     gravity: Positive | None = None
     masses: Mapping[str, Positive] = field(default_factory=dict)
     flat_feet: bool = False
+    groups: tuple[tuple[Index, ...], ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -84,13 +88,14 @@ class RobotSpec(Checked):
         """The robot.
 
         Raises:
-            RobotError: if there is none, it is no such biped, or it lacks a link that has a mass.
+            RobotError: if there is none, it is no such biped, it lacks a link that has a mass, or
+                groups are not each foot once.
             ParameterError: if a shipped robot comes with what only a URDF needs.
         """
         robot = self._load()
-        if self.gravity is None and not self.masses:
+        if self.gravity is None and not self.masses and not self.groups:
             return robot
-        return robot.changed(self.gravity, self.masses)
+        return robot.changed(self.gravity, self.masses, self.groups)
 
     def _load(self) -> Biped:
         """The robot as its URDF has it; see :meth:`load`."""

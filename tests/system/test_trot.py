@@ -9,13 +9,17 @@ from template_control.embedding.robot_route import robot_route
 from template_control.errors import ScenarioError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
+from template_control.robot.spec import RobotSpec
 from template_control.run.options import Push
 from template_control.run.specs import GaitSpec
 from template_control.slip.scenario.scenario import Scenario, Segment
 
+PACE = ((0, 2), (1, 3))
+"""The pairs of Go2's feet on its left and on its right."""
 
-def trot(name, gait, speed, steps, **options):
-    robot = tc.load_floating_robot(name)
+
+def trot(name, gait, speed, steps, groups=(), **options):
+    robot = RobotSpec(name, groups=groups).load()
     return tc.simulate(
         tc.Experiment(robot, motion=GaitSpec(gait, speed=speed), steps=steps, **options)
     )
@@ -37,9 +41,12 @@ def check_trot(record, tilt=0.02):
 
 
 @pytest.mark.slow(seconds=4)
-@pytest.mark.parametrize(("name", "speed"), [("go2", 0.9), ("go2", 2.0), ("solo12", 0.8)])
-def test_a_running_trot_keeps_its_speed(name, speed):
-    record = trot(name, "run", speed, 24)
+@pytest.mark.parametrize(
+    ("name", "groups", "speed"), [("go2", PACE, 0.9), ("go2", (), 2.0), ("solo12", (), 0.8)]
+)
+def test_a_running_trot_or_pace_keeps_its_speed(name, groups, speed):
+    record = trot(name, "run", speed, 24, groups)
+    assert record.groups == (groups or ((0, 3), (1, 2)))
     load, pairs = check_trot(record)
     np.testing.assert_allclose(record.section_state[-6:, 0], speed, rtol=0.02)
     both = (pairs[0].max(axis=1) > 1.0) & (pairs[1].max(axis=1) > 1.0)

@@ -181,6 +181,7 @@ def another(hint, default):
 
 OTHERWISE = {
     "robot.model": "human", "robot.locked": {"a": 0.1}, "robot.feet": ["a", "b"],
+    "robot.groups": [[0, 2], [1, 3]], "world.robot.groups": [[0, 2], [1, 3]],
     "motion.kind": "gait", "motion.segments": [{"gait": "walk", "speed": 1.0, "steps": 3}],
     "motion.velocities": [[0.0, 0.5, 0.0, 0.0]], "motion.gaits": ["stand", "walk"],
     "motion.speed": 1.0, "motion.touchdown_angle": 66.0, "motion.start": [1.0, 0.97, 0.0],
