@@ -52,6 +52,8 @@ _HEAVY = 0.6  # of the mass: rabbit, whose legs have 62 %, runs 14 steps; go2 ha
 _HEIGHTS = np.linspace(0.9, 1.3, 161)  # over l0, that are tried
 _WALKED = (0.0957, 0.463)  # over sqrt(g l0): 0.30 and 1.45 m/s; bolt fell with 0.08 and 0.48
 _SWING_TORQUE = 0.5  # of a hip's limit: rabbit walked with 0.49, and 0.06 m/s too slow with 0.55
+# On soles: TALOS kept 0.90 m/s with 0.547 of its hips; G1 0.9 m/s, 0.352, and fell at 0.376.
+_SOLES_WALKED, _SOLES_SWING_TORQUE = (_WALKED[0], 0.36), 0.55
 _STANCE_TORQUE = 0.73  # of a knee's limit: human walked with 0.72, and fell with 0.79
 _UNEVEN = 0.42  # of the speed at VLO: rabbit walked with 0.41, and fell with 0.46
 # Slopes that a walk of 30 steps from a stand climbed and descended [rad]: uphill by what the swing
@@ -148,13 +150,14 @@ def walking_speeds(robot: Biped, torque_scale: Positive = 1.0) -> tuple[float, f
     p = template_for(robot)
     family = walking_by_speed()
     unit = p.speed_unit
-    slowest, fastest = (unit * speed for speed in _WALKED)
+    slowest, fastest = (unit * v for v in (_SOLES_WALKED if robot.patches else _WALKED))
+    most = _SOLES_SWING_TORQUE if robot.patches else _SWING_TORQUE
     swings = []
     for chain in family.chains:
         for speed in chain.vlo_speed[::_EVERY]:
             gait = chain.gait(p, unit * float(speed))
             uneven, hip = _swing(robot, gait)
-            share = max(hip / _SWING_TORQUE, _stance(robot, gait) / _STANCE_TORQUE)
+            share = max(hip / most, _stance(robot, gait) / _STANCE_TORQUE)
             swings.append((gait.mean_speed, gait.vlo[0], uneven, share))
     mean, vlo, uneven, share = np.array(swings).T
     # A sole bears what the swing of heavy legs adds.

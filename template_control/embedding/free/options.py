@@ -130,9 +130,6 @@ _SOLE_SINGLE = PhaseControl(
 )
 # Heavy legs fold as little as they may: as those on point feet, they turn the trunk by 0.5 rad.
 _SOLE_SWING = replace(RUNNING_SWING, clearance=0.08, landing_speed=0.4)
-# At 0.9 m/s G1's hips are at their limits as a swing begins. Where its foot, 40 mm behind by then,
-# was caught up with, the centre of pressure went to the heel, and the walk got no slower.
-_SOLE_WALKING_SWING = SwingOptions(lag=0.003)
 _SOLE_RUNNING = PhaseControl(
     # As point feet have it. To keep the trunk upright against the legs takes the hips' limits in
     # half of the stance, and the angular momentum that is left costs a fifth of the speed.
@@ -259,7 +256,7 @@ class SoleOptions(FreeOptions):
 
     Attributes:
         phases: tasks, clock, feet and learners of each phase.
-        swing: shape of the swings, whose references wait for the feet.
+        swing: shape of the swings; None: by the hips' speed, and the reference waits for the foot.
         lean: none: the trunk stays upright.
         lateral: heavy legs run with their feet at half of the walk's distance, just side by side;
             at all of it they turn the trunk by 0.36 rad to either side, and by 0.7 as they begin.
@@ -268,7 +265,7 @@ class SoleOptions(FreeOptions):
     kind: ClassVar[str] = "soles"
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(SOLE_PHASES))
-    swing: SwingOptions | None = field(default_factory=lambda: _SOLE_WALKING_SWING)
+    swing: SwingOptions | None = None
     lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
     lateral: LateralOptions = field(default_factory=lambda: LateralOptions(running_width=0.5))
 

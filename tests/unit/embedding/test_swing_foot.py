@@ -3,10 +3,14 @@
 import numpy as np
 import pytest
 
+from template_control.embedding.robot_template import template_for
 from template_control.embedding.swing import (
     FEET,
     HIGH_SWING,
+    SLOW_SWING,
+    SOLE_SWING,
     SwingOptions,
+    Swings,
     begin_swing,
     drop,
     furthest,
@@ -20,6 +24,7 @@ from template_control.embedding.tick import TICK, move_swings
 from template_control.robot.library import load_floating_robot
 from template_control.robot.terms import ROBOT_DATA
 from template_control.slip.automaton.vocabulary import Leg
+from template_control.slip.similarity import Scale, scaled
 from template_control.whole_body.task import References
 
 
@@ -74,6 +79,26 @@ def test_a_swing_steps_along_the_quintics_of_its_parts():
         quintic_step(other_x, 0.7, 0.0, to_go - options.early, 1e-3)
         quintic_step(other_y, *up, 1e-3)
         np.testing.assert_array_equal((swing.x, swing.y), (other_x, other_y))
+
+
+def test_a_swing_that_begins_at_once_is_slower_at_its_fastest():
+    fastest = []
+    for start in (0.0, 6.0):
+        swing = Swing(SwingOptions(start=start, early=0.0), np.zeros(2), np.zeros(2))
+        speeds = []
+        for i in range(390):
+            swing.advance(0.8, 0.4 - i * 1e-3)
+            speeds.append(swing.x[1])
+        fastest.append(max(speeds) / (0.8 / 0.4))
+        assert swing.x[0] == pytest.approx(0.8, abs=1e-3)
+    np.testing.assert_allclose(fastest, [1.875, 1.74], atol=0.01)
+
+
+@pytest.mark.parametrize(("name", "shape"), [("g1", SOLE_SWING), ("talos", SLOW_SWING)])
+def test_a_flat_foot_swings_by_how_fast_its_hip_is(name, shape):
+    scale = Scale.of(template_for(load_floating_robot(name)))
+    swings = Swings.of(load_floating_robot(name), scale)
+    assert swings == (scaled(shape, scale),) * 2
 
 
 def test_swing_clears_the_ground_and_lands_slowly():
