@@ -92,7 +92,7 @@ def test_another_mass_walks_and_is_learnt(scale):
 
 @pytest.mark.slow(9)
 @pytest.mark.parametrize(
-    ("impulse", "heading", "steps"), [(10.0, 225.0, []), (15.0, 90.0, []), (15.0, 180.0, ["sb"])]
+    ("impulse", "heading", "steps"), [(10.0, 225.0, []), (15.0, 270.0, []), (15.0, 180.0, ["sb"])]
 )
 def test_a_pushed_stand_is_held_or_caught_by_a_step(impulse, heading, steps):
     """One foot is ahead: two corners of the rectangle around both are not between them."""

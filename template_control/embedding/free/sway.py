@@ -22,6 +22,13 @@ from template_control.whole_body.solver import SOLE_SHARE
 Array = NDArray[np.float64]
 
 _HOLDING = 1.5  # by which it moves beyond the capture point's distance from where a robot stands
+_LUNGE = 3.0  # by which a trunk that rolls leads a capture point back, over how fast it leaves
+_DEEPEST = 0.35  # roll at most: at 0.4 the leg on the other side is straight [rad]
+_NEARLY = 0.99  # of that: the ground is wide enough
+_RETURN = 0.5  # of the way that the pressure leads the capture point back: the trunk's return
+_SPARED = 0.03  # of the CoM's height, by which it is led inside: at the edge it would stay
+_LEANT = 0.1  # roll from which on it is led so far [rad]
+_ROLLED = 0.09  # of the CoM's height, by which a radian of the trunk's roll moves it (G1, TALOS)
 _HALVINGS = 30  # of a way between two feet
 _SIDE_GAIN = 2.0  # by which the centre of pressure moves beyond the capture point's error
 _SIDE_SHARE = 0.7  # of half a sole's width, by which it moves at most
@@ -39,6 +46,8 @@ _WIDEST = 0.5  # of the legs' length: the furthest foothold to the side that cat
 # For the reference template.
 _AGAIN = 0.01  # a plan is made anew after this time [s]
 _FAR = 1.6  # an event that is further away, or never comes, is planned for here [s]
+_ROLL_TIME = 0.2  # kd / kp of the trunk's roll [s]
+_HALT = 0.1  # time in which a trunk that rolls comes to rest [s]
 _REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soonest [s]
 
 
@@ -121,12 +130,43 @@ def _stand(t: Any, r: Any, want: Any) -> None:
     for axis in range(2):
         way[axis] = r.foot_position[1 - rear, axis] - here[axis]
         point[axis] -= here[axis]
+    off, gap = point[_SIDE] - 0.5 * way[_SIDE], point[_SIDE]
     hold(way, half, point)
+    gap -= point[_SIDE]
+    _lunge(t, r, want, off, gap)
     for axis in range(2):
         point[axis] += here[axis]
     t.lateral.pressure, t.lateral.pressure_at = point[_SIDE], -np.inf
     want.ahead = lift * (com[0] - point[0]) - uphill
     want.sway = lift * (com[_SIDE] - point[_SIDE])
+
+
+@compiled
+def _lunge(t: Any, r: Any, want: Any, off: float, gap: float) -> None:
+    """Let the trunk roll where the ground is too narrow for the capture point.
+
+    ``off`` is how far it is to the left of the middle of the feet, ``gap`` of the centre of
+    pressure [m]. With z the CoM's height and an angular momentum of m z rho roll' it has
+
+        xi' = w (xi - p) + rho roll'.
+
+    So it is led back over the ground, and the trunk returns as the pressure leaves it room.
+    """
+    roll, lateral = r.attitude[0], t.lateral
+    want.lean[0] = lateral.bank
+    if gap * off <= 0.0 and abs(gap) >= _NEARLY * _HOLDING * abs(off):
+        return
+    time, rolled = _ROLL_TIME * lateral.unit, _ROLLED * _height(t, r)
+    side = np.copysign(1.0, off)
+    spared = _SPARED * _height(t, r) * min(max(-side * roll / _LEANT, 0.0), 1.0)
+    rate = side * _rate(t, r) * (side * gap + spared) / rolled
+    if side * rate > 0.0:
+        room = max(_DEEPEST + side * roll, 0.0) / (_HALT * lateral.unit)
+        rate = -min(max(_LUNGE * rate, -room), room)
+    else:
+        most = max(_RETURN * abs(rate), lateral.bank_rate)
+        rate = side * min(-side * roll / time, most)
+    want.lean[0] = roll + time * rate
 
 
 @compiled
