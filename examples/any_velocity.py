@@ -5,10 +5,10 @@
 
 The command jumps every 5 to 10 s, and the robot learns of it as it jumps: a speed forward within
 the range, or backward up to --backward, or 0 with the probability --rest where the robot can
-stand; speeds to the left, and turning rates, up to these to both sides. The number of a trial is
-its seed. The error in each of the three is that of the mean over a command from 3 s after its jump
-on, in the frame of the trunk's heading; a robot that turns round first stands by then. It is that
-off the command, and off what was accepted of it: a run changes its speed as fast as it can.
+stand or hop; speeds to the left, and turning rates, up to these to both sides. The number of a
+trial is its seed. The error in each of the three is that of the mean over a command from 3 s after
+its jump on, in the frame of the trunk's heading; a robot that turns round first stands by then. It
+is that off the command, and off what was accepted of it: a run changes its speed as fast as it can.
 """
 
 import argparse
@@ -26,7 +26,7 @@ _SETTLING = 3.0  # [s]
 Row = tuple[float, float, float, float]
 
 
-def random_velocities(seed: int, o: argparse.Namespace, stands: bool) -> list[Row]:
+def random_velocities(seed: int, o: argparse.Namespace, rests: bool) -> list[Row]:
     """Times and velocities, drawn with this seed."""
     rng, time = np.random.default_rng(seed), 0.0
     slowest, fastest = o.forward
@@ -36,7 +36,7 @@ def random_velocities(seed: int, o: argparse.Namespace, stands: bool) -> list[Ro
         least, most = (-back, -o.left, -o.turn), (fastest - slowest, o.left, o.turn)
         forward, left, turn = rng.uniform(least, most)
         forward += slowest if forward >= 0.0 else -slowest
-        if rng.random() < o.rest and stands:
+        if rng.random() < o.rest and rests:
             forward = left = turn = 0.0
         rows.append((time, forward, left, turn))
         time += rng.uniform(*o.stay)
@@ -91,7 +91,7 @@ def main() -> None:
     can = VelocityRange.of(robot)
     falls, all_errors = 0, []
     for seed in range(o.first, o.first + o.trials):
-        rows = random_velocities(seed, o, can.stands)
+        rows = random_velocities(seed, o, can.backward > 0.0)
         profile = tc.run.VelocityProfile(tuple(rows), o.duration, foreseen=False, gaits=can.gaits)
         record = tc.simulate(tc.Experiment(robot, motion=profile, record_every=10))
         assert isinstance(record, tc.run.FloatingRecord)

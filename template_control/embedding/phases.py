@@ -113,7 +113,10 @@ _STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, follow_curve=True)
 
 
 def running_phases(
-    flight: tuple[Task, ...], stance: PhaseControl, double: PhaseControl
+    flight: tuple[Task, ...],
+    stance: PhaseControl,
+    double: PhaseControl,
+    hop: PhaseControl | None = None,
 ) -> dict[Phase | str, PhaseControl]:
     """Entries of a run, and of the strides between walking and running.
 
@@ -121,8 +124,11 @@ def running_phases(
         flight: tasks in flight.
         stance: control of a run's stances; its swings begin in flight.
         double: control of the double stance that leads into a run.
+        hop: control of a hop's stances; None: as a run's.
     """
     landed = replace(stance, replan_at_touchdown=True)
+    # A CoM that hardly moves forward shows no time by its direction.
+    hop = replace(hop or stance, clock=Clock.TIME)
     return {
         Phase.F: PhaseControl(
             tasks=flight,
@@ -134,6 +140,8 @@ def running_phases(
         ),
         "SS_sc^r": landed,
         "SS_sd^r": stance,
+        "SS_sc^hr": replace(hop, replan_at_touchdown=True),
+        "SS_sd^hr": hop,
         "DS_sc^wr": replace(double, replan_at_touchdown=True),
         "DS_sd^wr": double,
         "SS_sc^wr": landed,

@@ -34,7 +34,11 @@ STANDING: dict[str, str] = {
 }
 """The kinds of stride of a scenario that stands."""
 
-OTHERS: dict[str, str] = {StrideKind.WALK_PUSH_OFF: "walking with push-off", **STANDING}
+OTHERS: dict[str, str] = {
+    StrideKind.WALK_PUSH_OFF: "walking with push-off",
+    StrideKind.HOP: "hopping",
+    **STANDING,
+}
 """The kinds of stride that only some runs have."""
 
 _STATE = ("speed", "height", "vertical_speed")

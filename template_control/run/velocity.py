@@ -69,7 +69,8 @@ class VelocityProfile(Checked):
     The motion of an :class:`~template_control.run.Experiment`: the robot moves at any speed of its
     gaits. Footholds and heading follow from one step to the next; the forward speed
     changes as fast as the planner finds steps. Robots that can stand go backward too, at a
-    negative speed: they stop, and start the other way.
+    negative speed: they stop, and start the other way. Those that cannot hop below their slowest
+    walk, if run is among their gaits: slowly forward, on the spot and backward.
 
     Attributes:
         velocities: times, rising from 0 [s], each with the mean velocity forward and to the left
@@ -173,7 +174,8 @@ class VelocityRange:
         left: largest speed to the left and to the right [m/s]; 0 of a planar robot.
         turning: largest rate of the heading to both sides [rad/s]; 0 of a planar robot.
         stands: whether it can stand, at the speed 0.
-        backward: fastest mean speed backward [m/s]; 0 of one that cannot stand in between.
+        backward: fastest mean speed backward [m/s]; 0 of one that can neither stand in between nor
+            hop.
         run: fastest speed of its runs [m/s]; 0 where it does not run.
     """
 
@@ -205,7 +207,7 @@ class VelocityRange:
         unit = p.speed_unit
         run = round(_FASTEST_RUN * unit, 2) if can_run(robot) else 0.0
         stands = can_stand(robot)
-        backward = round(_BACKWARD * unit, 2) if stands else 0.0
+        backward = round(_BACKWARD * unit, 2) if stands or run else 0.0
         if not isinstance(robot, FloatingBaseBiped):
             return cls(speeds, first, run=run, backward=backward)
         left, turning = round(_LEFT * unit, 2), round(_TURNING * p.gravity / unit, 2)
@@ -222,7 +224,8 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
     """Where a robot is to go.
 
     One on pairs of feet, or held in its plane, goes along the velocity, and its trunk faces
-    elsewhere. One on two flat feet goes so backward only: to the left it places its feet.
+    elsewhere. One on two flat feet goes so backward only: to the left it places its feet. One on
+    two points hops backward.
 
     Args:
         velocity: the commanded.
@@ -232,7 +235,7 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
     forward, left, turning = velocity.at(time)
     if not _places(robot):
         return Course(0.0, turning, -atan2(left, forward) if forward or left else nan)
-    if forward < 0.0:
+    if forward < 0.0 and can_stand(robot):
         return Course(-left, turning, pi)
     return Course(left, turning, 0.0 if forward else nan)
 
@@ -249,6 +252,11 @@ def _slowest(robot: Biped) -> float:
     return _SLOWEST_ON_SOLES if robot.patches else _SLOWEST_ON_POINTS
 
 
+def _hops(robot: Biped, gaits: Sequence[Gait]) -> bool:
+    """Whether a robot with these gaits hops where others stand, or stop to go backward."""
+    return "run" in gaits and not can_stand(robot)
+
+
 def check_direction(
     robot: Biped, gaits: Sequence[Gait], forward: float, left: float, turning: float
 ) -> None:
@@ -261,12 +269,12 @@ def check_direction(
         raise ParameterError(
             f"{robot.name} is held in its plane: command it only forward or backward"
         )
-    if forward >= 0.0:
+    if forward >= 0.0 or _hops(robot, gaits):
         return
     if not can_stand(robot):
         raise ParameterError(
-            f"{robot.name} does not go backward, as it cannot stand in between: command it a speed"
-            " of 0 or more"
+            f"{robot.name} does not go backward, as it cannot stand in between: give it run among"
+            " its gaits, to hop, or command it a speed of 0 or more"
         )
     if "stand" not in gaits:
         raise ParameterError(
@@ -306,6 +314,8 @@ def velocity_route(
             return 0.0
         if not _places(robot):
             return hypot(speed, others[0])
+        if changes.hop and speed < slowest:
+            return speed
         stands = "stand" in motion.gaits and abs(speed) < 0.5 * slowest
         return 0.0 if stands else max(abs(speed), slowest)
 
@@ -317,7 +327,8 @@ def velocity_route(
         walk = _FASTEST_ON_SOLES if robot.patches else _FASTEST_WALK
         fastest = walking_speeds(robot)[1] if planar else walk * template.speed_unit
         unit = Scale.of(template).speed
-        changes = replace(changes, run=min(changes.run, fastest / unit))
+        hop = slowest / unit if _hops(robot, motion.gaits) else 0.0
+        changes = replace(changes, run=min(changes.run, fastest / unit), hop=hop)
         if robot.patches:
             reference = template.speed_unit / unit
             changes = replace(

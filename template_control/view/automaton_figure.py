@@ -129,6 +129,7 @@ GAIT_NAMES: dict[str, str] = {
     StrideKind.WALK_PUSH_OFF: "walking with push-off",
     StrideKind.STEP_FORWARD: "step from a stand",
     StrideKind.STEP_BACK: "step back from a stand",
+    StrideKind.HOP: "hopping",
 }
 """Gaits by the superscripts of Table I, and of standing."""
 

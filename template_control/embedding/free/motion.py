@@ -54,6 +54,11 @@ FACING_RATE = 0.18
 FACING_TIME = 1.7
 
 
+def _steps(gait: Gait) -> bool:
+    """Whether a gait has steps, on the spot too: no spring carries a stand."""
+    return bool(gait.controls.any())
+
+
 class LateralMotion:
     """Heading, and footholds to the left and right.
 
@@ -102,7 +107,7 @@ class LateralMotion:
         self.robot.facing, self._turns = 0.0, 0.0
         if in_flight:
             self._now[1] = 0.0
-        self.planner.reset(next((gait for gait in gaits if gait.step_length), None))
+        self.planner.reset(next(filter(_steps, gaits), None))
         for foot in range(2):
             self._stands(foot)
 
@@ -198,7 +203,7 @@ class LateralMotion:
         """
         planner, gait = self.planner, supervisor.planner.gait
         planner.data["section_began"] = time
-        if not gait.step_length:
+        if not _steps(gait):
             return self._stand(section, node, supervisor)
         side_ramp, walk_ramp, run_ramp = self._ramps
         turn_ramp = walk_ramp if node.stance else run_ramp

@@ -83,6 +83,19 @@ _POINT_RUNNING = PhaseControl(
     settles=True,
 )
 
+# The foot of a hop is hardly ahead of the CoM or behind it, and what turns about the vertical costs
+# ten times as much about y: back on one foot, forth on the other. With a weight of 400 the trunk
+# does not turn with its heading, and with 2000 the foot slides as it lands.
+_POINT_HOPPING = replace(
+    _POINT_RUNNING,
+    tasks=(
+        ComTask((0.01, 10.0)),
+        SpinTask(weight=(130.0, 130.0, 1000.0)),
+        *_FEET,
+        SpareJointTask(),
+    ),
+)
+
 _POINT_SINGLE = PhaseControl(
     # As in the plane; and the CoM's y is left to the place of the feet.
     tasks=(
@@ -104,6 +117,7 @@ FREE_PHASES: Phases = {
         ),
         _POINT_RUNNING,
         _POINT_DOUBLE,
+        _POINT_HOPPING,
     ),
     **_walking_phases(_POINT_SINGLE, _POINT_DOUBLE),
 }

@@ -75,6 +75,7 @@ def _leans() -> dict[str, Lean]:
         StrideKind.WALK_TO_RUN: Lean((1.2,), (0.33,)),
         StrideKind.RUN: Lean((2.0, 2.5, 3.0, 3.5, 4.0), (0.33, 0.34, 0.36, 0.40, 0.40), excess=0.1),
         StrideKind.RUN_TO_WALK: Lean((1.2,), (0.33,), excess=0.1),
+        StrideKind.HOP: Lean((1.2,), (0.33,), excess=0.1),
     }
 
 

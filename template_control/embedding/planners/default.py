@@ -129,12 +129,18 @@ def default_planners(
             return walk.gait
         return gaits_by_speed(p).gait(speed) if any_speed else walking_gait(p, speed)
 
-    run = RunningPlanner(runs(slowest), _keeping_up(route))
+    keeping_up = _keeping_up(route)
+    run = RunningPlanner(runs(slowest), keeping_up)
+    hops: Planners = {}
+    if isinstance(route, SpeedRoute) and route.changes.hop:
+        still = running_gait(p, 0.0, stride=StrideKind.HOP)
+        hops = {StrideKind.HOP: RunningPlanner(still, keeping_up)}
     return {
         walk.gait.stride: walk,
         StrideKind.WALK_TO_RUN: TransitionPlanner(StrideKind.WALK_TO_RUN, walk, runs, WALK_TO_RUN),
         StrideKind.RUN: run,
         StrideKind.RUN_TO_WALK: TransitionPlanner(StrideKind.RUN_TO_WALK, run, walks, RUN_TO_WALK),
+        **hops,
         **recovery_planners(walk, _RECOVERY),
         **stands,
     }

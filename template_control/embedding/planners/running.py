@@ -67,11 +67,17 @@ def leg_bounds(
     as of the options.
     """
     table = np.empty((4, 3))
-    top = np.arcsin(min(z[1] / rest_length, 1.0)) - _TOP_MARGIN
+    top, low = np.pi, 0.0
+    if z[1] < rest_length:
+        steepest = np.arcsin(z[1] / rest_length) - _TOP_MARGIN
+        if legs[0] > 0.5 * np.pi:
+            low = np.pi - steepest
+        else:
+            top = steepest
     table[1, 0] = change[0]
     for i in range(2):
-        angle = min(legs[0] + _ANGLE_RANGE[i], top)
-        table[2 + i, 0] = min(max(angle, angles[0]), angles[1], top)
+        angle = max(min(legs[0] + _ANGLE_RANGE[i], top), low)
+        table[2 + i, 0] = max(min(max(angle, angles[0]), angles[1], top), low)
     for i in range(1, 3):
         table[1, i] = change[i] * legs[i]
         table[2, i], table[3, i] = stiffness_range[0] * legs[i], stiffness_range[1] * legs[i]

@@ -51,6 +51,9 @@ RUNNING_STANCE_FAILURES = (
 )
 """Of a stance that a flight follows: its liftoff is wanted."""
 
+HOPPING_STANCE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
+"""Of a run's stance that may go either way, and turn back."""
+
 CURVE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
 """Of a double stance that follows a curve in time."""
 
@@ -107,23 +110,29 @@ def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
     )
 
 
-def running() -> tuple[Node, ...]:
-    """Apex -> touchdown -> bottom -> liftoff -> apex."""
+def running(gait: str, failures: tuple[Edge, ...]) -> tuple[Node, ...]:
+    """Apex -> touchdown -> bottom -> liftoff -> apex; ``failures`` are those of its stances."""
     return (
-        _flight("F_aa^r", Edge(Event.TOUCHDOWN, "SS_sc^r", Reset.PLACE_REAR, "G_t^r")),
+        _flight(
+            f"F_aa^{gait}",
+            Edge(Event.TOUCHDOWN, f"SS_sc^{gait}", Reset.PLACE_REAR, f"G_t^{gait}"),
+        ),
         _single(
-            "SS_sc^r",
+            f"SS_sc^{gait}",
             Slot.K_SC,
-            Edge(Event.BOTTOM, "SS_sd^r", Reset.NONE, "G_b^r"),
-            *RUNNING_STANCE_FAILURES,
+            Edge(Event.BOTTOM, f"SS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
+            *failures,
         ),
         _single(
-            "SS_sd^r",
+            f"SS_sd^{gait}",
             Slot.K_SD,
-            Edge(Event.REAR_LIFTOFF, "F_ba^r", Reset.SWAP, "G_l^r"),
-            *RUNNING_STANCE_FAILURES,
+            Edge(Event.REAR_LIFTOFF, f"F_ba^{gait}", Reset.SWAP, f"G_l^{gait}"),
+            *failures,
         ),
-        _flight("F_ba^r", Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True)),
+        _flight(
+            f"F_ba^{gait}",
+            Edge(Event.APEX, f"F_aa^{gait}", Reset.NONE, f"G_a^{gait}", section=True),
+        ),
     )
 
 
@@ -275,13 +284,14 @@ def steps_from_a_stand() -> tuple[Node, ...]:
 AUTOMATON = Automaton(
     nodes=(
         *walking(StrideKind.WALK, (Slot.K_SC, Slot.K_SD)),
-        *running(),
+        *running(StrideKind.RUN, RUNNING_STANCE_FAILURES),
         *walk_to_run(),
         *run_to_walk(),
         *simplified_walk_to_run(),
         *standing(),
         *walking(StrideKind.WALK_PUSH_OFF, (Slot.K_PUSH, Slot.K_PUSH)),
         *steps_from_a_stand(),
+        *running(StrideKind.HOP, HOPPING_STANCE_FAILURES),
     ),
     starts={
         StrideKind.WALK: "SS_av^w",
@@ -296,6 +306,7 @@ AUTOMATON = Automaton(
         StrideKind.WALK_PUSH_OFF: "SS_av^wp",
         StrideKind.STEP_FORWARD: "DS_al^sf",
         StrideKind.STEP_BACK: "DS_al^sb",
+        StrideKind.HOP: "F_aa^hr",
     },
 )
 """The one automaton of the library."""

@@ -25,6 +25,7 @@ class StrideKind(StrEnum):
     CHANGE_SPEED = "ww"  # of a walk, by a curve in time
     STEP_FORWARD = "sf"  # from a stand to a stand
     STEP_BACK = "sb"
+    HOP = "hr"  # a slow run, forward, backward or on the spot
 
     def __repr__(self) -> str:
         return repr(self.value)

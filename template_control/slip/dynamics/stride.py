@@ -128,16 +128,16 @@ def controls(
         k_push: stiffness of the rear leg in double stance, in a walking step with push-off [N/m].
 
     Raises:
-        ParameterError: if the angle is not in (0, pi/2) or a stiffness is negative or NaN.
+        ParameterError: if the angle is not in (0, pi) or a stiffness is negative or NaN.
     """
     u = np.zeros(NUM_SLOTS)
     u[Slot.TOUCHDOWN_ANGLE] = touchdown_angle
     u[Slot.K_SC], u[Slot.K_SD] = k_sc, k_sd
     u[Slot.K_SC_WR], u[Slot.K_SD_WR] = k_sc_wr, k_sd_wr
     u[Slot.K_PUSH] = k_push
-    if not 0.0 < touchdown_angle < np.pi / 2:
+    if not 0.0 < touchdown_angle < np.pi:
         raise ParameterError(
-            f"touchdown angle is {touchdown_angle!r} rad: give one between 0 and pi/2"
+            f"touchdown angle is {touchdown_angle!r} rad: give one between 0 and pi"
         )
     if not (np.all(np.isfinite(u)) and np.all(u >= 0.0)):
         raise ParameterError(f"leg stiffnesses are {u[1:].tolist()}: give finite ones >= 0 [N/m]")

@@ -24,8 +24,11 @@ from template_control.slip.parameters import SlipParameters
 Array = NDArray[np.float64]
 
 _SLOWEST, _FASTEST = 0.383, 1.597  # dx/dt at apex over sqrt(g l0): 1.2 to 5 m/s where l0 is 1 m
+_RANGES = {StrideKind.RUN: (_SLOWEST, _FASTEST), StrideKind.HOP: (-_SLOWEST, _SLOWEST)}
+_HOPS = 1.015, 0.995  # heights of the apex over l0, of a hop on the spot and of the fastest one
 _SCAN = 60
 _FLATTEST = np.radians(50.0)  # a leg that lands flatter would need a friction coefficient near 1
+_TIP = 1e-6  # of the steepest leg from where it would land at once, or from the vertical [rad]
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
@@ -41,6 +44,7 @@ class RunningGait:
         step_length: [m].
         step_duration: from apex to apex [s].
         flight_share: of the duration, without a foot on the ground.
+        stride: its kind, from apex to apex: a run, or a hop.
     """
 
     name: str
@@ -50,6 +54,7 @@ class RunningGait:
     step_length: float
     step_duration: float
     flight_share: float
+    stride: str = StrideKind.RUN
 
     def __repr__(self) -> str:
         angle = np.degrees(self.controls[Slot.TOUCHDOWN_ANGLE])
@@ -57,11 +62,6 @@ class RunningGait:
             f"<RunningGait {self.name}: {self.mean_speed:.3f} m/s, touchdown angle {angle:.2f} deg,"
             f" at apex {self.apex[0]:.3f} m/s and {self.apex[1]:.4f} m>"
         )
-
-    @property
-    def stride(self) -> str:
-        """Kind of stride: from apex to apex."""
-        return StrideKind.RUN
 
     @property
     def state(self) -> Array:
@@ -75,18 +75,27 @@ class RunningGait:
 
 
 @checked
-def running_speeds(parameters: SlipParameters) -> tuple[float, float]:
-    """Slowest and fastest dx/dt at apex of the family [m/s]."""
+def running_speeds(parameters: SlipParameters, stride: str = StrideKind.RUN) -> tuple[float, float]:
+    """Slowest and fastest dx/dt at apex of the family [m/s].
+
+    Args:
+        parameters: the template.
+        stride: of a run, or of a hop, which goes backward as fast as forward.
+    """
     unit = parameters.speed_unit
-    return float(_SLOWEST * unit), float(_FASTEST * unit)
+    slowest, fastest = _RANGES[StrideKind(stride)]
+    return float(slowest * unit), float(fastest * unit)
 
 
 def suited_height(relative_speed: float) -> float:
     """Height of the apex over l0 that suits dx/dt over sqrt(g l0).
 
     The lower the apex, the less the knees bend and the smaller their torques. A slow run needs a
-    higher one to leave the ground.
+    higher one to leave the ground, and a hop one from which it falls by 1.5 % of l0.
     """
+    if abs(relative_speed) < _SLOWEST - _SAME:
+        still, fast = _HOPS
+        return still + (fast - still) * (relative_speed / _SLOWEST) ** 2
     return float(0.97 + 0.01 / (1.0 + np.exp((relative_speed - 0.69) / 0.06)))
 
 
@@ -94,8 +103,9 @@ def suited_stiffness(relative_speed: float) -> float:
     """k l0 / (m g) that suits dx/dt over sqrt(g l0).
 
     The stiffer the leg, the less the knee bends; a leg that is too stiff for a slow run leaves it
-    no flight, and its apexes alternate.
+    no flight, and its apexes alternate. Below the slowest run it is that one's.
     """
+    relative_speed = max(relative_speed, _SLOWEST)
     return float(1.65 + (48.8 - 14.3 * relative_speed) * relative_speed)
 
 
@@ -106,6 +116,8 @@ def running_gait(
     apex_height: Positive | None = None,
     leg_stiffness: Positive | None = None,
     name: str = "run",
+    *,
+    stride: str = StrideKind.RUN,
 ) -> RunningGait:
     """The symmetric gait with a given speed at apex.
 
@@ -116,6 +128,7 @@ def running_gait(
         leg_stiffness: before and after the bottom [N/m]; by default
             :func:`suited_stiffness`'s.
         name: of the gait.
+        stride: of a run, or of a hop: that backward is the mirror image of the one forward.
 
     Raises:
         GaitError: naming the range, if the speed is out of it; and if the template has no such
@@ -123,39 +136,46 @@ def running_gait(
     """
     p = parameters
     unit = p.speed_unit
-    low, high = running_speeds(p)
+    low, high = running_speeds(p, stride)
     if not low - _SAME * unit <= speed <= high + _SAME * unit:
         raise GaitError(
             f"no running gait has {speed:g} m/s at its apex: give a speed from"
             f" {inward(low, high)} m/s"
         )
-    relative = float(speed / unit)
+    relative = abs(float(speed / unit))
     if apex_height is None:
         apex_height = suited_height(relative) * p.rest_length
     if leg_stiffness is None:
         leg_stiffness = suited_stiffness(relative) * p.mass * p.gravity / p.rest_length
     z = np.array([speed, apex_height])
-    angle = _symmetric_angle(p, z, leg_stiffness)
+    angle = _symmetric_angle(p, np.abs(z), leg_stiffness, stride)
     if angle is None:
         raise GaitError(
             f"no running gait has {speed:g} m/s and {apex_height:g} m at its apex with legs of"
             f" {leg_stiffness:g} N/m: give others, or neither"
         )
-    u = controls(angle, leg_stiffness, leg_stiffness)
-    stride = simulate_stride(p, STRIDE_START[StrideKind.RUN], APEX.state(z), u)
-    return RunningGait(name, p, z, u, float(stride.state[0]), stride.duration, flying(stride))
+    u = controls(angle if speed >= 0.0 else np.pi - angle, leg_stiffness, leg_stiffness)
+    path = simulate_stride(p, STRIDE_START[stride], APEX.state(z), u)
+    length, kind = float(path.state[0]), StrideKind(stride)
+    return RunningGait(name, p, z, u, length, path.duration, flying(path), stride=kind)
 
 
-def _symmetric_angle(parameters: SlipParameters, z: Array, stiffness: float) -> float | None:
+def _symmetric_angle(
+    parameters: SlipParameters, z: Array, stiffness: float, kind: str
+) -> float | None:
     """The touchdown angle with which the apex returns [rad], None if there is none."""
-    step = ReturnMap(parameters, StrideKind.RUN)
+    step = ReturnMap(parameters, kind)
+    # A hop that comes back to its height may have turned back.
+    returns = 0 if kind == StrideKind.HOP else 1
 
     def surplus(angle: float) -> float:
         z_next, outcome = step.step(z, controls(angle, stiffness, stiffness))
-        return float(z_next[1] - z[1]) if outcome is Outcome.SECTION else np.nan
+        found = float(z_next[returns] - z[returns])
+        return found if outcome is Outcome.SECTION else np.nan
 
     # A steeper leg lets the robot pass under the apex it came from, a flatter one throws it higher.
-    top = np.arcsin(min(z[1] / parameters.rest_length, 1.0)) - 1e-6
+    top = np.arcsin(min(z[1] / parameters.rest_length, 1.0))
+    top += -_TIP if z[1] < parameters.rest_length else _TIP  # on the spot the leg is vertical
     angles = np.linspace(top, _FLATTEST, _SCAN)
     above = surplus(angles[0])
     for steep, flat in pairwise(angles):
@@ -193,6 +213,8 @@ class RunningFamily:
         for gait in self._known:
             if abs(gait.apex[0] - speed) <= same:
                 return gait
-        gait = running_gait(p, float(np.clip(speed, *running_speeds(p))))
+        stride = self._known[0].stride
+        low, high = running_speeds(p, stride)
+        gait = running_gait(p, min(max(speed, low), high), stride=stride)
         self._known.append(gait)
         return gait

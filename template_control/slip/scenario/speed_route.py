@@ -31,6 +31,7 @@ _NEAR = 0.1  # difference from it with which a run begins [m/s]
 _FIRST = 1.3  # dx/dt at the first apex of a run [m/s]: the slower, the less torque it needs
 _LAST = 1.4  # dx/dt at apex from which on a run may end [m/s]
 _LEAN = 3.5  # time of the trunk to lean forward before a run, and to rise after it [s]
+_KEPT = (StrideKind.WALK_PUSH_OFF, StrideKind.RUN, StrideKind.HOP)
 _STOP = 0.5  # dx/dt at VLO from which one step leads to rest [m/s]
 
 
@@ -42,6 +43,8 @@ class GaitChangeOptions(Checked):
         run: mean speed from which a robot runs, and below which it walks [m/s].
         take_off: dx/dt at the VLO where a run begins and ends [m/s].
         fastest: dx/dt at apex of the fastest run [m/s]; a faster one is not wanted of the template.
+        hop: mean speed below which a robot that runs hops: it runs slowly, on the spot and
+            backward [m/s]; 0: it does not.
         hysteresis: width of the band about ``run`` in which it keeps its gait [m/s].
         acceleration: of the speed that is wanted of a run, on its way to another [m/s^2].
     """
@@ -49,6 +52,7 @@ class GaitChangeOptions(Checked):
     run: Positive = tuned(1.4, SPEED)
     take_off: Positive = tuned(1.1, SPEED)
     fastest: Positive = tuned(6.0, SPEED)
+    hop: NotNegative = tuned(0.0, SPEED)
     hysteresis: NotNegative = tuned(0.1, SPEED)
     acceleration: Positive = tuned(0.35, ACCELERATION)
 
@@ -114,8 +118,11 @@ class SpeedRoute:
             speed * scale.speed for speed in (_SLOWEST, _NEAR, _FIRST, _LAST, _STOP)
         )
         self._take_off = self.changes.take_off
+        self._slowest_hop = running_speeds(parameters, StrideKind.HOP)[0]
+        self._least = self._first - self._near if self.changes.hop else -np.inf
         self._lean = _LEAN * scale.time
-        self._fastest = min(running_speeds(parameters)[1], self.changes.fastest)
+        self._slowest_run, fastest = running_speeds(parameters)
+        self._fastest = min(fastest, self.changes.fastest)
         self._speed, self._duration = speed, duration
         self._family = walking_by_speed()
         low, high = self._family.range(parameters)
@@ -147,7 +154,7 @@ class SpeedRoute:
         """See :meth:`~.route.Route.next`."""
         if now > self._way.began:
             # A stand or a change of gait says nothing about the next stride's duration.
-            repeats = self._way.stride in (StrideKind.WALK_PUSH_OFF, StrideKind.RUN)
+            repeats = self._way.stride in _KEPT
             took = now - self._way.began if repeats else self._guess
             self._way = self._way._replace(took=took)
         self._way, goal = self._go(section, z, now)
@@ -170,10 +177,18 @@ class SpeedRoute:
 
     def _gait(self, wanted: float, way: _Way) -> Gait:
         """The gait of a mean speed [m/s]."""
-        border = self.changes.run + 0.5 * self.changes.hysteresis * (-1.0 if way.runs else 1.0)
-        if "run" in self.gaits and wanted >= border:
+        border = self.changes.run + self._later(way)
+        if "run" in self.gaits and (wanted >= border or self._hops(wanted, way)):
             return "run"
         return STAND if STAND in self.gaits and wanted < self._slowest else "walk"
+
+    def _later(self, way: _Way) -> float:
+        """How far above its border a run begins, and below it ends [m/s]."""
+        return 0.5 * self.changes.hysteresis * (-1.0 if way.runs else 1.0)
+
+    def _hops(self, wanted: float, way: _Way) -> bool:
+        """Whether a mean speed [m/s] is a hop's."""
+        return self.changes.hop > 0.0 and wanted < self.changes.hop - self._later(way)
 
     def _from_rest(
         self, way: _Way, speed: float, wanted: float, now: float
@@ -212,12 +227,14 @@ class SpeedRoute:
         self, way: _Way, speed: float, wanted: float, now: float
     ) -> tuple[_Way, StrideGoal]:
         on = self._gait(wanted, way) == "run"
-        if not on and speed <= self._last:
+        if not on and self._least <= speed <= self._last:
             return way, self._to_take_off(StrideKind.RUN_TO_WALK, StrideKind.WALK_PUSH_OFF)
-        aim = min(max(wanted, self._first), self._fastest) if on else self._first
+        least = self._slowest_hop if self._hops(wanted, way) else self._first
+        aim = min(max(wanted, least), self._fastest) if on else self._first
         most = self.changes.acceleration * way.took
         way = way._replace(reference=min(max(aim, way.reference - most), way.reference + most))
-        goal = self._run(StrideKind.RUN, way.reference)
+        hops = way.reference < self._slowest_run
+        goal = self._run(StrideKind.HOP if hops else StrideKind.RUN, way.reference)
         return way, replace(goal, then=None if on else StrideKind.RUN_TO_WALK)
 
     def _stand(self, stride: str, then: str | None) -> StrideGoal:
@@ -249,7 +266,6 @@ class SpeedRoute:
         Raises:
             ScenarioError: if the function does not say one.
         """
-        found = check(
-            f"the wanted speed at {time:g} s", self._speed(time), NotNegative, ScenarioError
-        )
+        kind = float if self.changes.hop else NotNegative
+        found = check(f"the wanted speed at {time:g} s", self._speed(time), kind, ScenarioError)
         return float(found)

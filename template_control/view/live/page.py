@@ -98,7 +98,7 @@ class Controls:
 
     def _add_walk(self) -> None:
         r = self._ranges
-        slowest = -r.backward if r.stands else r.speeds[0]
+        slowest = -r.backward if r.backward else r.speeds[0]
         fastest = max(r.speeds[1], r.run)
         self.speed = self._slide("speed [m/s]", (slowest, fastest), r.first, 0.01)
         self._velocity = [self.speed]

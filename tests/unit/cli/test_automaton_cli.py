@@ -214,6 +214,7 @@ def test_transitions_are_chosen_at_their_own_section():
         (starts["wp"], starts["ws"]),
         (starts["wp"], starts["ww"]),
         (starts["r"], starts["rw"]),
+        (starts["hr"], starts["rw"]),
         (starts["w"], starts["ws"]),
         (starts["w"], starts["ww"]),
         (starts["s"], starts["sw"]),

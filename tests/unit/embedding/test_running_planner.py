@@ -62,6 +62,35 @@ def test_an_error_is_nearly_gone_after_one_stride(planner, gait):
     assert abs(end[1] - gait.apex[1]) < 0.3 * 0.004
 
 
+def test_a_hop_turns_back_in_one_stance_and_mirrored_the_other_way():
+    """Within a stance dx/dt changes its sign, which is no failure of a hop."""
+    planner, step = RunningPlanner(running_gait(P, 1.0, stride="hr")), ReturnMap(P, "hr")
+    ends, angles = [], []
+    for sign in (1.0, -1.0):
+        z, target = np.array([0.03 * sign, 1.014]), np.array([-0.04 * sign, 1.015])
+        decision = planner.decide(Context(z, target))
+        assert decision.nominal
+        end, outcome = step.step(z, decision.controls)
+        assert outcome is Outcome.SECTION
+        assert end[0] == pytest.approx(target[0], abs=0.02)
+        ends.append(sign * end[0])
+        angles.append(sign * (decision.controls[Slot.TOUCHDOWN_ANGLE] - 0.5 * np.pi))
+    assert ends[0] == pytest.approx(ends[1], abs=1e-9)
+    assert angles[0] == pytest.approx(angles[1], abs=1e-9)
+
+
+def test_a_leg_lands_on_the_side_to_which_a_low_apex_goes():
+    """Below l0 a leg near the vertical would be on the ground at once."""
+    planner = RunningPlanner(running_gait(P, 1.0, stride="hr"))
+    for sign in (1.0, -1.0):
+        target = running_gait(P, 0.5 * sign, stride="hr").apex
+        decision = planner.decide(Context(np.array([0.5 * sign, 0.996]), target))
+        assert decision.feasible
+        steep = decision.controls[Slot.TOUCHDOWN_ANGLE]
+        assert np.sin(steep) < 0.996
+        assert np.sign(np.cos(steep)) == sign
+
+
 @pytest.mark.parametrize("speed", [2.0, 4.0])
 def test_a_far_target_is_approached_step_by_step(planner, speed):
     z, target, step = np.array([3.0, 0.97]), running_gait(P, speed).apex, ReturnMap(P, "r")

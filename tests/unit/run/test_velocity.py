@@ -7,8 +7,8 @@ import template_control as tc
 from template_control.cli.experiment_options import experiment_from
 from template_control.errors import ParameterError
 from template_control.run.options import HeadingCommand
-from template_control.run.velocity import VelocityRange, velocity_route
-from template_control.slip.maps.section import VLO
+from template_control.run.velocity import VelocityRange, course_at, velocity_route
+from template_control.slip.maps.section import APEX, VLO
 
 ROWS = ((0.0, 0.5, 0.0, 0.0), (2.0, 0.6, 0.05, 0.2))
 PROFILE = tc.run.VelocityProfile(ROWS, duration=5.0)
@@ -74,8 +74,20 @@ def test_a_robot_is_commanded_what_it_can():
     assert free.speeds[0] == pytest.approx(route.next(VLO, route.start, 0.0).wanted_speed, abs=0.01)
     assert (planar.gaits, planar.run) == (("stand", "walk", "run"), 3.01)
     assert (free.gaits, free.run) == (("walk", "run"), 1.8)
-    assert (planar.backward, free.backward) == (0.6, 0.0)
+    assert (planar.backward, free.backward) == (0.6, 0.36)
     assert VelocityRange.of(tc.load_robot("rabbit")).gaits == ("stand", "walk")
+
+
+def test_a_robot_on_two_points_hops_below_its_slowest_walk():
+    bolt = tc.load_floating_robot("bolt")
+    for forward in (-0.3, 0.0, 0.2):
+        command = tc.run.VelocityCommand(forward, 0.02, 0.1, gaits=("walk", "run"))
+        route = velocity_route(bolt, command, HeadingCommand())[1]
+        z = np.array([forward, 0.36])
+        goal = route.next(APEX, z, 0.0)
+        assert goal.stride == "hr"
+        assert course_at(command, 0.0, bolt)[:2] == (0.02, 0.1)
+        assert not course_at(command, 0.0, bolt).turns_round(bolt)
 
 
 @pytest.mark.slow(seconds=4)

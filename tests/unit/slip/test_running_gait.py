@@ -47,6 +47,28 @@ def test_gaits_vary_smoothly_with_speed():
         assert np.max(np.abs(second)) < 0.01
 
 
+@given(share=st.floats(-0.99, 0.99))
+@settings(max_examples=25, deadline=None)
+def test_a_hop_goes_forward_on_the_spot_and_backward(share):
+    speed = share * running_speeds(P, "hr")[1]
+    gait, back = (running_gait(P, sign * speed, stride="hr") for sign in (1.0, -1.0))
+    stride = simulate_stride(P, STRIDE_START["hr"], APEX.state(gait.apex), gait.controls)
+    np.testing.assert_allclose(APEX.of(stride.state), gait.apex, atol=1e-9)
+    assert 0.2 < gait.flight_share < 0.3
+    assert gait.step_length == pytest.approx(-back.step_length, abs=1e-9)
+    assert gait.step_duration == pytest.approx(back.step_duration, abs=1e-9)
+    angle = Slot.TOUCHDOWN_ANGLE
+    assert gait.controls[angle] - 0.5 * np.pi == pytest.approx(
+        0.5 * np.pi - back.controls[angle], abs=1e-9
+    )
+
+
+def test_a_hop_on_the_spot_lands_on_a_vertical_leg():
+    still = running_gait(P, 0.0, stride="hr")
+    assert still.controls[Slot.TOUCHDOWN_ANGLE] == pytest.approx(0.5 * np.pi, abs=1e-9)
+    assert still.step_length == pytest.approx(0.0, abs=1e-9)
+
+
 def test_templates_of_all_sizes_run_alike():
     unit, small = np.sqrt(P.gravity * P.rest_length), np.sqrt(SMALL.gravity * SMALL.rest_length)
     gait, other = running_gait(P, 0.9 * unit), running_gait(SMALL, 0.9 * small)

@@ -169,7 +169,8 @@ def test_legs_change_roles_where_a_flight_begins():
     landed = stride.events[0].state[0] + np.cos(u[Slot.TOUCHDOWN_ANGLE])
     np.testing.assert_allclose(stride.toes, [-1.0, landed])
     taken = {(n.name, e.target) for n in AUTOMATON.nodes for e in n.edges if e.reset is Reset.SWAP}
-    expected = {("SS_sd^r", "F_ba^r"), ("SS_sd^wr", "F_ba^wr"), ("SS_av^wr", "F_aa^wr")}
+    expected = {(f"SS_sd^{kind}", f"F_ba^{kind}") for kind in ("r", "wr", "hr")}
+    expected |= {("SS_av^wr", "F_aa^wr")}
     assert taken == expected | {("DS_br^sb", "DS_ar^s")}  # and where one has landed behind
 
 

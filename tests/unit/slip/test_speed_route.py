@@ -46,6 +46,27 @@ def test_a_speed_from_zero_to_a_run_and_back_stands_walks_and_runs():
     ]
 
 
+def test_a_robot_that_hops_goes_through_the_spot_backward_and_walks_again():
+    def wanted(time):
+        return -0.4 if 2.0 < time < 20.0 else 1.0
+
+    changes = GaitChangeOptions(hop=0.8)
+    goals = followed(tc.SpeedRoute(P, wanted, gaits=("walk", "run"), changes=changes), 35.0)
+    assert kinds(goals) == [
+        StrideKind.WALK_PUSH_OFF,
+        StrideKind.WALK_TO_RUN,
+        StrideKind.HOP,
+        StrideKind.RUN,
+        StrideKind.RUN_TO_WALK,
+        StrideKind.WALK_PUSH_OFF,
+    ]
+    hops = [goal for _, goal in goals if goal.stride == StrideKind.HOP]
+    speeds = np.array([goal.target[0] for goal in hops])
+    assert speeds.min() == -0.4
+    assert np.abs(np.diff(speeds)).max() <= DURATION * changes.acceleration + 1e-9
+    assert all(goal.target[1] > 0.99 for goal in hops)
+
+
 def test_feet_that_bear_are_not_closed_by_a_step():
     wanted = tc.SpeedProfile((0.0, 4.0, 4.1), (0.8, 0.8, 0.0))
     goals = followed(tc.SpeedRoute(P, wanted, gaits=ALL, bears=True), 10.0)
