@@ -47,9 +47,10 @@ _SIDE = 1  # y, to the left
 SIDE_RAMP = 0.05  # change of the speed to the left [m/s^2]
 TURN_RAMP = 0.1  # change of a walk's turning rate [rad/s^2, of the reference template]
 RUN_RAMP = 0.15  # and of a run's, which leans into its turns
-# And of a hop's, whose foot is below the CoM: the legs turn the trunk only by pushing to and fro.
-# With a run's ramp Bolt's fell behind by 0.25 rad as the turn changed from 0.3 to -0.34 rad/s.
-HOP_RAMP = 0.045
+# The same of kinds of stride that have their own. The foot of a hop is below the CoM: the legs turn
+# the trunk only by pushing to and fro. With a run's ramp Bolt's fell behind by 0.25 rad as the turn
+# changed from 0.3 to -0.34 rad/s.
+TURN_RAMPS: dict[str, float] = {StrideKind.HOP: 0.045}
 BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference template]
 # A trunk that turns from its course turns the course, at this rate at most [rad/s, of the reference
 # template], and comes there with this time constant [s, the same].
@@ -96,8 +97,9 @@ class LateralMotion:
         self._now: Array = np.zeros(3)
         self._turns = 0.0  # of the trunk from the course, in the present stride [rad]
         self._reach = BEYOND * scale.length
-        turns = (ramp / scale.time**2 for ramp in (TURN_RAMP, RUN_RAMP, HOP_RAMP))
+        turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
         self._ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
+        self._own_ramps = {kind: ramp / scale.time**2 for kind, ramp in TURN_RAMPS.items()}
         self._facing = FACING_RATE / scale.time, FACING_TIME * scale.time
 
     def begin(self, gaits: Iterable[Gait], course: Course, in_flight: bool) -> None:
@@ -208,10 +210,8 @@ class LateralMotion:
         planner.data["section_began"] = time
         if not _steps(gait):
             return self._stand(section, node, supervisor)
-        side_ramp, walk_ramp, run_ramp, hop_ramp = self._ramps
-        turn_ramp = hop_ramp if gait.stride == StrideKind.HOP else run_ramp
-        if node.stance:
-            turn_ramp = walk_ramp
+        side_ramp, walk_ramp, run_ramp = self._ramps
+        turn_ramp = self._own_ramps.get(gait.stride, walk_ramp if node.stance else run_ramp)
         most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
         self._now += np.clip(self._wanted(course) - self._now, -most, most)
         left, turn, self._turns = (gait.step_duration * self._now).tolist()
