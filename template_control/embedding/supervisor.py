@@ -38,11 +38,14 @@ Array = NDArray[np.float64]
 
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
-_JUST_BEYOND = 1.002
-"""Length of a leg over l0 up to which a path that begins lets it go at once. One that is extended
-further is being pushed off and soon overstretched: where it was let go before, `five-link`'s trunk
-turned over in the flight of a walk that broke into a run.
+_BARELY_BEYOND, _JUST_BEYOND = 1.002, 1.01
+"""Lengths of a leg over l0 up to which a path that begins lets it go at once: any, and one that
+extends slowly. One further out that extends fast is being pushed off: where it was let go
+(1.005, half of sqrt(g l0)), `five-link`'s trunk turned over in the flight of a walk that broke into
+a run. Solo12's slow legs (up to 1.009, 0.2 of sqrt(g l0)) stayed down with 2 % of the weight, and
+it fell.
 """
+_SLOW = 0.3  # extension of a leg over sqrt(g l0)
 
 
 class StrideSupervisor:
@@ -352,11 +355,14 @@ class StrideSupervisor:
 
     def _lets_go(self, node: Node, state: Array, sensed: TemplateState) -> bool:
         """True if the rear leg is just beyond l0, on springs, and is to lift off."""
-        edge = node.edge(Event.REAR_LIFTOFF)
+        edge, p = node.edge(Event.REAR_LIFTOFF), self.parameters
         if edge is None or edge.target not in self.automaton.index or node.name in self.curved:
             return False
-        length = hypot(state[0] - sensed.toes[0], state[1])
-        return 1.0 < length / self.parameters.rest_length < _JUST_BEYOND
+        ahead, height, *speed = state[0] - sensed.toes[0], *state[1:]
+        length = hypot(ahead, height)
+        extends = (ahead * speed[0] + height * speed[1]) / length
+        most = _JUST_BEYOND if extends < _SLOW * p.speed_unit else _BARELY_BEYOND
+        return 1.0 < length / p.rest_length < most
 
     def time_of(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
