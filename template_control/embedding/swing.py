@@ -285,7 +285,7 @@ foot, 40 mm behind by then, was caught up with, the centre of pressure went to t
 walk got no slower."""
 
 SLOW_SWING = SwingOptions(lag=0.003, clearance=0.03, start=6.0)
-"""The same of hips that come to their limit of speed: the foot is low, and moves at once."""
+"""The same of hips that come to their limit of speed. The foot is low, and moves at once."""
 
 # Limit of speed below which hips are slow [rad/s], for the reference template: TALOS, with 5.4, had
 # its hips at it in a tenth of a walk at 0.9 m/s, and was 2 % too fast. G1 has 26.
