@@ -256,7 +256,10 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
         share = com_x - com_y * (com[4] + body[2]) / lift - (rear - body[5])
         share /= front - rear + 2.0 * body[5]
         share = min(max(share, 0.0), 1.0)
-        for leg in range(2):
+        forces[1] = 0.0
+        if np.isnan(front):  # in the air
+            share = 0.0
+        for leg in range(1 if np.isnan(front) else 2):
             load = body[0] * lift * (share if leg == 1 else 1.0 - share)
             forces[leg, 0] = load * (com_x - meta_row[3 + leg]) / com_y
             forces[leg, 1] = load

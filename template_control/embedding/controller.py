@@ -445,6 +445,8 @@ class EmbeddingController:
                     self._face_ahead()
                 reached = ended if section is VLO else None
             learners.end_stride(section, s.state, nominal)
+        if section is REST and self.robot.patches:
+            self._face_ahead()  # a foot may have been set down behind the other one
         now = section, s, self.time, learners.state
         self._enter(supervisor.decide(*now, reached).name)
         learners.begin_stride(supervisor, self.mode.trimmed)
@@ -485,9 +487,13 @@ class EmbeddingController:
         s, supervisor, clock = self.observer.now, self.supervisor, self.path_clock
         deviation = s.state[2] - clock.reference[2]
         cause = supervisor.surprise(self.node, deviation, clock.time, self.time)
-        if cause is None:
+        node, now = None, self.time
+        if self.lateral is not None:
+            node = self.lateral.catch(cause, supervisor, self.mode, s, clock.time, now)
+        if node is None and cause is not None:
+            node = supervisor.replan(cause, self.node, s, now, phase_time=clock.time)
+        if node is None:
             return
-        node = supervisor.replan(cause, self.node, s, self.time, phase_time=clock.time)
         self._enter(node.name)
         self.learners.lean.aim(supervisor.goal)
         self.path_clock.restart()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from template_control.checks.fitting import answered_or_none
 from template_control.embedding.com_path import Landing, TemplatePath, join
+from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.planners.planner import Cause, Decision, Planner, Planners
 from template_control.embedding.recovery import Recovery
 from template_control.embedding.replanning import (
@@ -26,10 +27,12 @@ from template_control.embedding.replanning import (
     find_recovery,
 )
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners, TemplateRollout
+from template_control.embedding.standing.planners import StepPlanner
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot, StrideKind
+from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
@@ -344,6 +347,32 @@ class StrideSupervisor:
             node = self.automaton.node(first.start)
         else:
             first = self._rollout.forward(node.name, sensed, state, u)
+        return self._take(node, first, state, sensed, now)
+
+    def catch(
+        self, node: Node, step: CatchingStep, sensed: TemplateState, now: float
+    ) -> Node | None:
+        """Make a step that catches the robot, which is in ``node``; the node that it begins in.
+
+        None where no planner makes it.
+        """
+        kind, begins = self.goal.stride, node.name
+        if len(node.stance) > 1:
+            kind = StrideKind.STEP_FORWARD if step.foot == sensed.feet[0] else StrideKind.STEP_BACK
+            begins = self.automaton.starts[kind]
+        planner = self.planners.get(kind)
+        if not isinstance(planner, StepPlanner):
+            return None
+        start = np.column_stack((sensed.state[:2], sensed.state[2:4], sensed.acceleration))
+        toes = float(sensed.toes[0]), float(sensed.toes[1])
+        self.decision, first = planner.catch(begins, start, toes, step)
+        self.goal = replace(self.goal, stride=kind, target=planner.gait.state)
+        self.without_touchdown = False
+        return self._take(self.automaton.node(first.start), first, sensed.state, sensed, now)
+
+    def _take(
+        self, node: Node, first: Stride, state: Array, sensed: TemplateState, now: float
+    ) -> Node:
         strides, self.viable = self._rollout.strides(node, first, self.goal, now)
         self.path, self.feet = join(strides, self._rollout.scale.time), sensed.feet
         self._look_ahead(0)

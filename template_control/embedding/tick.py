@@ -134,7 +134,7 @@ def sense(
     if not read_state(t.sensed, t.feet, r, t.mode):
         return DIVERGED
     stand(tick, data, references, qp)
-    if fired_edge(tick) >= 0:
+    if fired_edge(tick) >= 0 or t.lateral.leaves:
         return EVENTFUL
     speed, reference = t.sensed.state[2], references[0].com[2]
     return EVENTFUL if plan_is_due(t.path, t.mode, speed, reference, t.time) else QUIET

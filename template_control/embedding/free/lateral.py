@@ -123,6 +123,10 @@ LATERAL = np.dtype(
         ("unit", _F),  # of time, over the reference template's
         ("pressure", _F),  # y of the centre of pressure [m]; NaN: not planned
         ("pressure_at", _F),  # when it was planned [s]
+        # Whether the capture point is further off the ground under both feet, on which it is held,
+        # than the trunk's roll leads it back.
+        ("leaves", _I),
+        ("catches", _I),  # whether a step catches it
         ("half_width", _F),  # how far to either side of its middle a foot bears; 0 of a point [m]
         # -- the foothold: see Placement --
         ("step", _F),  # to it in the gait, see LateralAim [m]

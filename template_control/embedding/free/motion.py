@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.embedding.free.catching import Reach, catching_step
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.lateral import (
     BEYOND,
@@ -23,12 +24,14 @@ from template_control.embedding.free.lateral import (
     early_touchdown,
 )
 from template_control.embedding.free.options import SOLE_STAND, FreeOptions
-from template_control.embedding.planners.planner import Context, Decision, decided
+from template_control.embedding.free.sway import LOWEST
+from template_control.embedding.modes import Mode
+from template_control.embedding.planners.planner import Cause, Context, Decision, decided
 from template_control.embedding.state import TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
-from template_control.embedding.swing import Feet
+from template_control.embedding.swing import Feet, level_reach
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.terms import onward
+from template_control.robot.terms import UP, onward
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Event, StrideKind
 from template_control.slip.gaits.gait import Gait
@@ -39,6 +42,7 @@ from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
+from template_control.whole_body.solver import SOLE_SHARE
 from template_control.whole_body.task import References
 
 Array = NDArray[np.float64]
@@ -82,7 +86,7 @@ class LateralMotion:
         data: Any,
     ) -> None:
         ready(LATERAL)
-        scale = Scale.of(parameters)
+        scale = self._scale = Scale.of(parameters)
         step = self.step_width = scaled(options, scale).step_width
         self.stand_width = SOLE_STAND * parameters.rest_length if robot.patches else step
         wish = LateralWish(step)
@@ -126,6 +130,43 @@ class LateralMotion:
         if momentum_speed:
             speed = (speed - s.momentum[0] / (self.robot.mass * height)) * self.robot.sway
         return np.array([s.com[_SIDE], speed])
+
+    def catch(
+        self,
+        cause: Cause | None,
+        supervisor: StrideSupervisor,
+        mode: Mode,
+        sensed: TemplateState,
+        path_time: float,
+        now: float,
+    ) -> Node | None:
+        """Let a robot on soles step that is pushed too hard to stand; its node then.
+
+        After a deviation the rest of a step is planned anew. ``cause`` is that of a new plan, if
+        there is one; ``path_time`` is along the path, ``now`` since the start [s]. None where the
+        robot need not step, or no planner makes it.
+        """
+        robot, data, in_air = self.robot, self.robot.data[0], None
+        if robot.patches and cause is Cause.DEVIATION and mode.control.follow_curve and mode.swings:
+            due = supervisor.time_of(Event.TOUCHDOWN) - path_time
+            in_air = self._feet.foot_of_leg[mode.swings[0]], due
+        elif not self.planner.data[0]["leaves"]:
+            return None
+        x, height, speed, _ = sensed.state.tolist()
+        height = max(height, LOWEST * robot.leg_length)
+        y, sideways = self.state(height, True)
+        level = [level_reach(data, foot, data["foot_position"][foot, UP]) for foot in range(2)]
+        reach = Reach(
+            half=SOLE_SHARE * np.array([robot.half_length, robot.half_width]),
+            rates=np.sqrt(robot.gravity / height * np.array([1.0, robot.sway])),
+            level=np.array(level) - (y, 0.0),
+            scale=self._scale,
+        )
+        motion = np.array([[x, y], [speed, sideways]])
+        step = catching_step(motion, robot.space.foot_position[:, :2], reach, in_air)
+        node = supervisor.catch(mode.node, step, sensed, now)
+        self.planner.data["catches"] = node is not None
+        return node
 
     @property
     def taken(self) -> Course:
@@ -282,6 +323,7 @@ class LateralMotion:
     def touch_down(self, foot: int, lasted: float) -> None:
         """A foot has landed, ``lasted`` [s] after the section."""
         self.planner.touch_down(lasted)
+        self.planner.data["catches"] = 0
         self._stands(foot)
         self.planner.aim(self._side(foot))
 

@@ -307,8 +307,8 @@ class TrotOptions(FreeOptions):
 
 
 SOLE_STAND = 0.24
-"""Lateral distance of two soles that stand, over l0. No step catches a push to the side: with that
-of a walk's steps G1's soles enclosed 8 mm less than 15 N s take."""
+"""Lateral distance of two soles that stand, over l0. With that of a walk's steps G1's soles
+enclosed 8 mm less than 15 N s to a side take without a step."""
 
 AnyOptions = EmbeddingOptions | FreeOptions | TrotOptions | SoleOptions
 """Options of a kind of robot."""

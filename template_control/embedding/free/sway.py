@@ -16,6 +16,7 @@ from template_control.compiled import compiled
 from template_control.embedding.com_path import sample
 from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
 from template_control.embedding.standing.supports import UNLOADING
+from template_control.robot.terms import onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.solver import SOLE_SHARE
 
@@ -29,6 +30,9 @@ _RETURN = 0.5  # of the way that the pressure leads the capture point back: the 
 _SPARED = 0.03  # of the CoM's height, by which it is led inside: at the edge it would stay
 _LEANT = 0.1  # roll from which on it is led so far [rad]
 _ROLLED = 0.09  # of the CoM's height, by which a radian of the trunk's roll moves it (G1, TALOS)
+# Of it, by how far the capture point may be off the ground under both feet without a step: the
+# trunk leads 15 N s to a side back.
+_BORNE = 0.026
 _HALVINGS = 30  # of a way between two feet
 _SIDE_GAIN = 2.0  # by which the centre of pressure moves beyond the capture point's error
 _SIDE_SHARE = 0.7  # of half a sole's width, by which it moves at most
@@ -39,8 +43,11 @@ _REAR, _FRONT = 0, 1
 _STAGES = 3  # both feet stand, one does, both do
 _PIECES = 8  # of each
 _LIGHTEST = 0.05  # of the weight: legs do not pull
-_LOWEST = 0.3  # of the legs' length: the least height of the CoM that is planned with
+LOWEST = 0.3
+"""Of the legs' length: the least height of the CoM that is planned with."""
 _LEAST_SHARE = 0.3  # of a step, at which a capture point is taken to be between the feet
+CATCHING_SHARE = 0.7
+"""Share of a catching step's way to the side at which the capture point is as the foot lands."""
 _SPARE = 0.4  # of half a sole's length, by which it may be off the line between them
 _WIDEST = 0.5  # of the legs' length: the furthest foothold to the side that catches the CoM
 # For the reference template.
@@ -69,10 +76,13 @@ def sway(t: Any, r: Any, want: Any, curve: tuple[Array, Array, Array]) -> None:
         e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
     """
     mode, forces, height = t.mode, t.path.forces, _height(t, r)
+    t.lateral.leaves = 0
     if mode.follow_curve and mode.stances > 1 and _on_soles(t, r) and _rests(t):
         _stand(t, r, want)
         return
     if mode.follow_curve:
+        if mode.stances == 1:  # a step needs no roll, and with one its leg is straight
+            want.lean[0] = t.lateral.bank
         want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - _pressure(t, r, curve))
         return
     t.lateral.pressure = np.nan
@@ -131,7 +141,8 @@ def _stand(t: Any, r: Any, want: Any) -> None:
         way[axis] = r.foot_position[1 - rear, axis] - here[axis]
         point[axis] -= here[axis]
     off, gap = point[_SIDE] - 0.5 * way[_SIDE], point[_SIDE]
-    hold(way, half, point)
+    if hold(way, half, point) > _BORNE * _height(t, r):
+        t.lateral.leaves = 1
     gap -= point[_SIDE]
     _lunge(t, r, want, off, gap)
     for axis in range(2):
@@ -170,11 +181,12 @@ def _lunge(t: Any, r: Any, want: Any, off: float, gap: float) -> None:
 
 
 @compiled
-def hold(way: Array, half: Array, point: Array) -> None:
+def hold(way: Array, half: Array, point: Array) -> float:
     """Turn a capture point (2,) into the centre of pressure that leads it between two equal feet.
 
     They enclose what a rectangle with half the sides ``half`` (2,), its middle at 0, covers on its
-    way ``way`` (2,) to the other one's [m]: a hexagon about the middle.
+    way ``way`` (2,) to the other one's [m]: a hexagon about the middle. Returns how far outside the
+    capture point is [m].
     """
     x, y = point[0] - 0.5 * way[0], point[1] - 0.5 * way[1]
     beyond = 1.0 + _HOLDING
@@ -188,7 +200,7 @@ def hold(way: Array, half: Array, point: Array) -> None:
             beyond = most / off
     if beyond >= 1.0:
         point[0], point[1] = 0.5 * way[0] + beyond * x, 0.5 * way[1] + beyond * y
-        return
+        return 0.0
     low, high = 0.0, 1.0
     for _ in range(_HALVINGS):
         share, slope = 0.5 * (low + high), 0.0
@@ -204,12 +216,14 @@ def hold(way: Array, half: Array, point: Array) -> None:
     for axis in range(2):
         middle = share * way[axis]
         point[axis] = min(max(point[axis], middle - half[axis]), middle + half[axis])
+    x, y = x + 0.5 * way[0] - point[0], y + 0.5 * way[1] - point[1]
+    return np.sqrt(x * x + y * y)
 
 
 @compiled
 def _height(t: Any, r: Any) -> float:
     """Height of the CoM over the ground [m]; of a robot that falls it may be below its feet."""
-    return max(t.sensed.state[1], _LOWEST * r.leg_length)
+    return max(t.sensed.state[1], LOWEST * r.leg_length)
 
 
 @compiled
@@ -232,11 +246,16 @@ def closing_foothold(t: Any, r: Any, stands: int, lasts: float) -> float:
     if lateral.step == 0.0:
         return float(stance[_SIDE])
     lasts = min(lasts, _FAR * lateral.unit)
-    side = np.copysign(1.0, r.foot_position[1 - stands, _SIDE] - stance[_SIDE])
+    swings = onward(r.facing) * r.hip_side[1 - stands]
+    if swings == 0.0:
+        swings = r.foot_position[1 - stands, _SIDE] - stance[_SIDE]
+    side = np.copysign(1.0, swings)
     point = side * (r.com[_SIDE] + side_speed(t, r) / rate - stance[_SIDE])
     edge, step = SOLE_SHARE * lateral.half_width, abs(lateral.step)
     narrowest = min(abs(lateral.steps[0]), abs(lateral.steps[1]))
     shares = _shares_ahead(t, r, stands, lasts)
+    if lateral.catches:
+        shares = _LEAST_SHARE, CATCHING_SHARE
     apart = distance_aside(point, np.exp(rate * lasts), edge, shares, (step, narrowest))
     return float(stance[_SIDE] + side * min(apart, max(_WIDEST * r.leg_length, step)))
 
@@ -257,12 +276,15 @@ def distance_aside(
 
         xi_near / most <= d <= xi_far / least, xi_near, xi_far = (xi -+ Y) exp(w T) +- Y,
 
-    but no less than the second of ``steps``. ``point`` is xi now, from the foot that stands
-    towards the other one [m], ``growth`` exp(w T), ``edge`` Y, by how far the centre of pressure
-    may be to either side [m]; ``shares`` are the least and the most ahead.
+    but no less than the second of ``steps``; xi_far itself where that is beyond the foot that
+    stands, next to which or across which the other one then lands. ``point`` is xi now, from the
+    foot that stands towards the other one [m], ``growth`` exp(w T), ``edge`` Y, by how far the
+    centre of pressure may be to either side [m]; ``shares`` are the least and the most ahead.
     """
     least, most = shares
     near, far = (point - edge) * growth + edge, (point + edge) * growth - edge
+    if far < 0.0:
+        return far
     return min(max(steps[0], near / most), max(far / least, steps[1]))
 
 
@@ -317,7 +339,7 @@ def _shares_of_lifting(
     coefficients, meta, look = curve
     sample(coefficients, meta, look, t.path.time + after, com)
     lift = max(com[5] + r.gravity, _LIGHTEST * r.gravity)
-    along = com[0] - com[4] * max(com[1], _LOWEST * r.leg_length) / lift
+    along = com[0] - com[4] * max(com[1], LOWEST * r.leg_length) / lift
     apart = r.foot_position[1 - rear, 0] - r.foot_position[rear, 0]
     least, most = front_shares(along, apart, SOLE_SHARE * t.path.body[5])
     return (1.0 - most, 1.0 - least) if stays != rear else (least, most)

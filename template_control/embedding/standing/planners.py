@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
+from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
 from template_control.embedding.standing.curves import (
     PLACE,
@@ -34,6 +35,7 @@ from template_control.embedding.standing.passes import (
     Touchdown,
     width_price,
 )
+from template_control.embedding.standing.supports import curve_over
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
@@ -55,6 +57,8 @@ _TRIALS = 6  # of speeds, where a step's angle is chosen
 BEAT = 0.5
 """A stand is planned anew, and the route asked, after this time [s], for the reference template; a
 step from a stand ends this long after its curve, when the robot has come to rest too."""
+_LOW = 0.3  # of l0: the least height of the CoM that a catching step is planned with
+_CATCHING = 4  # pieces of the CoM's way over one foot
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
 _SOON = 1e-3  # [s]
 # Excess of a curve to a liftoff that is still followed, over l0: the QP keeps the centre of
@@ -319,12 +323,39 @@ class StepPlanner(Planner):
         best = self.landings.best(start, stiffness, feet.toes[::-1])
         if best is None:
             return []
-        on = np.zeros((2, TERMS))
-        on[:, :2] = start[:, :2]
-        soon = Quintic(on, _SOON)
+        soon = self._straight(start)
         price = self.landings.hurried(best, feet.toes[0])
         over = StepPass(stiffness, np.zeros(0), np.zeros(0), best)
         return [Away(Found((soon,), 0.0, 0.0), over, soon.end(), price)]
+
+    def catch(
+        self, node: str, start: Array, toes: tuple[float, float], step: CatchingStep
+    ) -> tuple[Decision, Stride]:
+        """A step that catches the robot: over the other foot as over a centre of pressure at rest.
+
+        Args:
+            node: the first, or single stance.
+            start: as for :meth:`curve`.
+            toes: the same.
+            step: which it is.
+        """
+        lifts = None
+        if node != self._single:
+            soon = self._straight(start)
+            lifts = timed_stride(AUTOMATON, node, [soon], toes)
+            start, toes = soon.end(), toes if self._way < 0.0 else toes[::-1]
+        end = np.array([[0.0, 0.0, 0.0], [self.gait.state[1], 0.0, 0.0]])
+        p = self._passes.parameters
+        height = max(float(start[1, 0]), _LOW * p.rest_length)  # of a robot that falls
+        rates = np.full(_CATCHING, np.sqrt(p.gravity / height))
+        pressures = np.full(_CATCHING, step.pressure)
+        pieces = curve_over(start, end, step.lasts, pressures, rates)
+        over = timed_stride(AUTOMATON, self._single, pieces, (toes[0], np.nan))
+        both = toes[0], step.foothold
+        so_far = Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+        decision, rests = self._rest(over.node, pieces[-1].end(), both, so_far)
+        stride = chained(replace(over, toes=np.array(both)), rests)
+        return decision, stride if lifts is None else chained(lifts, stride)
 
     def _swing(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
@@ -354,6 +385,12 @@ class StepPlanner(Planner):
         pieces = self._back(with_rest(found.pieces, self._beat))
         stride = timed_stride(AUTOMATON, node, pieces, toes)
         return replace(decision, feasible=feet.fits(found)), stride
+
+    def _straight(self, start: Array) -> Quintic:
+        """A moment from a start (2, 3), in which the CoM moves on."""
+        on = np.zeros((2, TERMS))
+        on[:, :2] = start[:, :2]
+        return Quintic(on, _SOON)
 
     def _turned(self, state: Array) -> Array:
         """(2, 3) x and y with their derivatives, seen in the direction of the step."""

@@ -92,11 +92,11 @@ class OverFeet(BetweenFeet):
         durations = durations[durations <= max(longest, durations[0])]
         durations = np.unique(np.maximum(durations, shortest))
         cost, excess, end, i = best_pressure(start, ends, durations, ground, lands, p, rates)
-        curve = _curve(start, ends[end], float(durations[i]), p, rates)
+        curve = curve_over(start, ends[end], float(durations[i]), p, rates)
         return Found(curve, excess, cost), end
 
 
-def _curve(
+def curve_over(
     start: Array, end: Array, duration: float, pressures: Array, rates: Array
 ) -> tuple[Quintic, ...]:
     """The curve of a duration [s] over centres of pressure (n,) [m], w (n,) being ``rates``."""

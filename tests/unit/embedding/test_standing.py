@@ -83,6 +83,14 @@ def test_forces_without_springs_carry_the_com_along_the_legs():
     np.testing.assert_allclose(forces[:, 0] / forces[:, 1], (com[0] + toe - feet) / com[1])
 
 
+def test_a_curve_over_one_foot_is_all_on_it():
+    forces = np.full((2, 2), np.nan)
+    com = np.array([0.12, 0.97, 0.1, 0.0, 0.4, -0.3])
+    leg_forces(np.array([0.0, 1.0, 0.0, 0.3, *3 * [np.nan]]), 0.3, com, BODY, forces)
+    assert forces[0, 1] == pytest.approx(P.mass * (P.gravity - 0.3))
+    assert not forces[1].any()
+
+
 def test_no_foot_pulls_where_the_centre_of_pressure_would_leave_it():
     forces = np.empty((2, 2))
     com = np.array([0.1, 0.97, 0.0, 0.0, -5.0, 0.0])

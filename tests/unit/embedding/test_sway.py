@@ -20,17 +20,19 @@ def test_the_pressure_leads_the_capture_point_back(seed):
     rng = np.random.default_rng(seed)
     point = 0.5 * WAY + rng.uniform(-0.15, 0.15, 2)
     found = point.copy()
-    sway.hold(WAY, HALF, found)
+    outside = sway.hold(WAY, HALF, found)
     away = point - 0.5 * WAY
     if enclosed(point[None]).item():
         beyond = np.linspace(1.0, 2.5, 3001)[:, None] * away + 0.5 * WAY
         best = beyond[enclosed(beyond)][-1]
         np.testing.assert_allclose(found, best, atol=2e-4)
+        assert outside == 0.0
     else:
         shares = np.linspace(0.0, 1.0, 20001)[:, None] * WAY
         there = np.clip(point, shares - HALF, shares + HALF)
         best = there[np.hypot(*(there - point).T).argmin()]
         np.testing.assert_allclose(found, best, atol=1e-4)
+        assert outside == pytest.approx(np.hypot(*(best - point)), abs=1e-6)
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -45,6 +47,13 @@ def test_a_stop_lands_with_the_capture_point_between_the_feet(seed):
     can = (landed[:, None] / np.linspace(*shares, 2001)).ravel()
     best = can[np.abs(can - steps[0]).argmin()]
     assert found == pytest.approx(max(best, steps[1]), abs=1e-4)
+
+
+def test_a_foot_goes_to_a_capture_point_beyond_the_one_that_stands():
+    """It would be there with the centre of pressure at the outer edge of the sole that stands."""
+    point, growth, edge = -0.06, 2.0, 0.02
+    found = sway.distance_aside(point, growth, edge, (0.6, 0.85), (0.15, 0.05))
+    assert found == pytest.approx(-edge + (point + edge) * growth)
 
 
 @pytest.mark.parametrize("apart", [0.17, -0.17, 0.0])
