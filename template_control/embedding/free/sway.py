@@ -256,6 +256,9 @@ def closing_foothold(t: Any, r: Any, stands: int, lasts: float) -> float:
     shares = _shares_ahead(t, r, stands, lasts)
     if lateral.catches:
         shares = _LEAST_SHARE, CATCHING_SHARE
+        beyond = (point + edge) * np.exp(rate * lasts) - edge
+        if beyond < 0.0:  # of the foot that stands: next to it, or across it
+            return float(stance[_SIDE] + side * beyond)
     apart = distance_aside(point, np.exp(rate * lasts), edge, shares, (step, narrowest))
     return float(stance[_SIDE] + side * min(apart, max(_WIDEST * r.leg_length, step)))
 
@@ -276,15 +279,12 @@ def distance_aside(
 
         xi_near / most <= d <= xi_far / least, xi_near, xi_far = (xi -+ Y) exp(w T) +- Y,
 
-    but no less than the second of ``steps``; xi_far itself where that is beyond the foot that
-    stands, next to which or across which the other one then lands. ``point`` is xi now, from the
-    foot that stands towards the other one [m], ``growth`` exp(w T), ``edge`` Y, by how far the
-    centre of pressure may be to either side [m]; ``shares`` are the least and the most ahead.
+    but no less than the second of ``steps``. ``point`` is xi now, from the foot that stands
+    towards the other one [m], ``growth`` exp(w T), ``edge`` Y, by how far the centre of pressure
+    may be to either side [m]; ``shares`` are the least and the most ahead.
     """
     least, most = shares
     near, far = (point - edge) * growth + edge, (point + edge) * growth - edge
-    if far < 0.0:
-        return far
     return min(max(steps[0], near / most), max(far / least, steps[1]))
 
 

@@ -49,13 +49,6 @@ def test_a_stop_lands_with_the_capture_point_between_the_feet(seed):
     assert found == pytest.approx(max(best, steps[1]), abs=1e-4)
 
 
-def test_a_foot_goes_to_a_capture_point_beyond_the_one_that_stands():
-    """It would be there with the centre of pressure at the outer edge of the sole that stands."""
-    point, growth, edge = -0.06, 2.0, 0.02
-    found = sway.distance_aside(point, growth, edge, (0.6, 0.85), (0.15, 0.05))
-    assert found == pytest.approx(-edge + (point + edge) * growth)
-
-
 @pytest.mark.parametrize("apart", [0.17, -0.17, 0.0])
 def test_the_loads_say_where_the_pressure_is_ahead(apart):
     """A share of the front foot is possible if some places in both soles give that pressure."""
