@@ -97,7 +97,7 @@ GUARDS = np.dtype(
 _value = unfused(guard)
 
 _TOUCHDOWN, _REAR_LIFTOFF = int(Event.TOUCHDOWN), int(Event.REAR_LIFTOFF)
-_FRONT_LIFTOFF, _REST = int(Event.FRONT_LIFTOFF), int(Event.REST)
+_FRONT_LIFTOFF, _REST, _VLO = int(Event.FRONT_LIFTOFF), int(Event.REST), int(Event.VLO)
 
 
 @compiled
@@ -146,6 +146,8 @@ def first_fired(g: Any, mode: Any, path: Any, s: Any, f: Any, c: Any) -> int:
         due = path.event_times[event] - path.time
         if fired(g, (event, mode.placed[i]), s, f, c.standing, due):
             return i
+        if mode.passed[i] and _value(_VLO, s.state, s.toes, g.rest_length, 0.0) >= 0.0:
+            return i
     return -1
 
 
@@ -174,6 +176,7 @@ MODE = np.dtype(
         ("edges", _I),  # to other nodes
         ("event", _I, (_MOST_EDGES,)),  # of each
         ("placed", _I, (_MOST_EDGES,)),  # the leg that each puts on the ground; -1: none
+        ("passed", _I, (_MOST_EDGES,)),  # whether each has been taken where VLO has come
         ("by_direction", _I),  # whether the clock is the direction of the CoM, not the time
         ("momentum_speed", _I),  # flags of the phase's entry in the table
         ("rolling_contact", _I),
@@ -208,8 +211,8 @@ class Mode:
     data: Any
 
 
-def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
-    """The mode of a node, which is the automaton's ``number``-th."""
+def _mode(node: Node, automaton: Automaton, control: PhaseControl, nv: int, trimmed: bool) -> Mode:
+    """The mode of an automaton's node."""
     touchdown, tasks = node.edge(Event.TOUCHDOWN), TaskStack(control.tasks, nv)
     edges = tuple(edge for edge in node.edges if isinstance(edge.target, str))
     if len(edges) > _MOST_EDGES:
@@ -217,12 +220,15 @@ def _mode(node: Node, number: int, control: PhaseControl, nv: int, trimmed: bool
             f"node {node.name} has {len(edges)} edges to other nodes: give at most {_MOST_EDGES}"
         )
     data = np.zeros(1, MODE)[0]
-    data["node"] = number
+    data["node"] = automaton.index[node.name]
     data["stances"], data["swings"], data["edges"] = map(len, (node.stance, control.swings, edges))
     data["swing_leg"][: len(control.swings)] = control.swings
     data["next_touchdown_leg"] = -1 if touchdown is None else PLACED[touchdown.reset]
     for i, edge in enumerate(edges):
         data["event"][i], data["placed"][i] = _numbered(edge)
+        then = automaton.nodes[automaton.index[str(edge.target)]]
+        # At the bottom of a leg that is let go soon the robot's guard may graze zero.
+        data["passed"][i] = edge.reset is Reset.NONE and then.edge(Event.VLO) is not None
     data["by_direction"] = control.clock is Clock.DIRECTION
     flags = ("momentum_speed", "rolling_contact", "trim_momentum", "follow_curve", "settles")
     for name in flags:
@@ -275,9 +281,7 @@ def modes(automaton: Automaton, nv: int, phases: Phases) -> dict[str, Mode]:
         for node in automaton.stride(start)
     }
     return {
-        node.name: _mode(
-            node, automaton.index[node.name], phase_control(phases, node), nv, node.name in trimmed
-        )
+        node.name: _mode(node, automaton, phase_control(phases, node), nv, node.name in trimmed)
         for node in automaton.nodes
     }
 

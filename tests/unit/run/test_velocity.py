@@ -90,6 +90,16 @@ def test_a_robot_on_two_points_hops_below_its_slowest_walk():
         assert not course_at(command, 0.0, bolt).turns_round(bolt)
 
 
+@pytest.mark.parametrize(
+    ("wanted", "goes"), [((0.4, 0.0), 0.4), ((0.2, 0.1), 0.35), ((0.1, -0.1), 0.0)]
+)
+def test_a_quadruped_goes_no_slower_than_its_slowest_walk(wanted, goes):
+    go2 = tc.load_floating_robot("go2")
+    command = tc.run.VelocityCommand(*wanted, gaits=("stand", "walk"))
+    route = velocity_route(go2, command, HeadingCommand())[1]
+    assert route.next(VLO, route.start, 0.0).wanted_speed == pytest.approx(goes, abs=0.01)
+
+
 @pytest.mark.slow(seconds=4)
 def test_five_link_3d_follows_its_velocities():
     velocities = ((0.0, 0.9, 0.0, 0.0), (3.0, 1.1, 0.1, 0.2), (10.0, 0.9, -0.1, -0.2))
