@@ -3,7 +3,8 @@
 Run: python benchmarks/control_tick.py [steps] [--gait walk] [--gait run] [--gait free] [--json]
 
 ``walk`` and ``run`` at 3 m/s are five-link's in the plane, ``free`` is Bolt's walk with a floating
-base, ``go2`` that robot's trot, and ``g1`` its walk with arms and waist held.
+base, ``go2`` that robot's trot, ``g1`` its walk with arms and waist held, and ``g1-29`` that with
+all joints.
 
 All in PyBullet. Ticks and physics steps take turns in one process, and the gaits take turns
 every few ticks, so that a machine which is slow for a while is so to all of them: only ratios of
@@ -70,6 +71,7 @@ GAITS: dict[str, tuple[Callable[[], Biped], Callable[[Biped], Planner | None]]] 
     "free": (lambda: load_floating_robot("bolt"), _free_planner),
     "go2": (lambda: load_floating_robot("go2"), _usual_planner),
     "g1": (lambda: load_floating_robot("g1"), _usual_planner),
+    "g1-29": (lambda: load_floating_robot("g1", upper_body=True), _usual_planner),
 }
 
 

@@ -185,6 +185,12 @@ OWN_URDF = (
         _ON,
     ),
     Flag(
+        "--upper-body",
+        "robot.upper_body",
+        "of a robot on flat feet: joints that are in no leg move, about where they would be locked",
+        _ON,
+    ),
+    Flag(
         "--lossless",
         "robot.lossless",
         "leave out the damping and friction of the URDF's joints",

@@ -36,6 +36,7 @@ from template_control.robot.urdf_edits import (
     drop_world,
     joints_in_no_leg,
     lock,
+    mimics,
     moving_joints,
     set_limits,
     set_ranges,
@@ -99,8 +100,10 @@ class FloatingBaseBiped(Biped):
         axes: (3, 3) turns vectors into the heading frame: ``vector @ axes``.
         space: what the sagittal terms leave out, in the heading frame; contacts and ``jacobians``
             have all three directions anyway.
-        spare: of each leg with four hinges, the joint above the hip whose axis is nearest to the
-            vertical: its index into ``joint_names``, and its angle in :meth:`neutral` [rad].
+        upper_body: indices into ``joint_names`` of the joints in no leg, arms and waist.
+        spare: of the joints that place no foot the index, and the angle in :meth:`neutral` [rad]:
+            of each leg with four hinges the one above the hip whose axis is nearest to the
+            vertical, and the upper body's.
         sway: of flat feet and of pairs, dy/dt of the CoM over dy/dt - L_x / (m z) where the feet
             and the attitude of the trunk rest, L the angular momentum about the CoM; else 1.
         rotation: (3, 3) of the trunk, to the world; a view that the next update overwrites.
@@ -118,6 +121,8 @@ class FloatingBaseBiped(Biped):
 
     def _prepare(self) -> None:
         model, data = self.model, self._data
+        placing = {joint for leg in self.legs for joint in leg}
+        self.upper_body = tuple(j for j in range(len(self.joint_names)) if j not in placing)
         self.rotation: Array = data.oMi[_ROOT].rotation
         self._hips = [data.oMi[hip] for hip, *_ in self._hinges]
         self._in_leg = np.zeros((len(self._hips), 3))
@@ -138,12 +143,13 @@ class FloatingBaseBiped(Biped):
         lever = model.inertias[_ROOT].lever[2]
         self.trunk_com = float(lever - self.hip_height(self._neutral))
         axes = pin.computeJointJacobians(model, model.createData(), self._neutral)[5]
-        self.spare = tuple(
-            (joint, float(self._neutral[model.nq - len(self.joint_names) + joint]))
+        turning = tuple(
+            max(leg[:-HINGES], key=lambda j: abs(axes[FLOATING_DOF + j]))
             for leg in self.legs
             if len(leg) > _PLACING and not self.patches
-            for joint in [max(leg[:-HINGES], key=lambda j: abs(axes[FLOATING_DOF + j]))]
         )
+        angles = self._neutral[model.nq - len(self.joint_names) :]
+        self.spare = tuple((j, float(angles[j])) for j in (*turning, *self.upper_body))
         now = self.data[0]
         now["spare"] = len(self.spare)
         for i, (joint, angle) in enumerate(self.spare):
@@ -163,13 +169,33 @@ class FloatingBaseBiped(Biped):
         It is that of the motion in which the soles and the attitude of the trunk rest: legs that
         swing to the side with the trunk have an angular momentum about the CoM.
         """
-        q = self.bent()
-        self.update(q, np.zeros(self.nv))
-        j = self.jacobians
-        rows = np.concatenate((j.com, j.turning, j.contact.reshape(-1, self.nv)))
-        v = np.linalg.lstsq(rows, np.eye(len(rows))[1], rcond=None)[0]
+        self.update(self.bent(), np.zeros(self.nv))
+        rows, j = self.placing_rows(), self.jacobians
+        v = self.smallest_motion(rows, np.eye(len(rows))[1])
         height = self.space.com[UP] - self.contact_position[:, UP].mean()
         return 1.0 / (1.0 - float(j.momentum[0] @ v) / (self.mass * float(height)))
+
+    def placing_rows(self) -> Array:
+        """(6 + 3 n, nv) Jacobians of the CoM, the trunk's turning and all contacts; 6 of soles."""
+        j = self.jacobians
+        return np.concatenate((j.com, j.turning, j.contact.reshape(-1, self.nv)))
+
+    def smallest_motion(self, rows: Array, wanted: Array) -> Array:
+        """(nv,) the smallest v of base and legs with rows v = wanted; the upper body rests.
+
+        Args:
+            rows: (m, nv) at the last update.
+            wanted: (m,).
+
+        Raises:
+            RobotError: if there is none.
+        """
+        rows = rows.copy()
+        rows[:, [FLOATING_DOF + joint for joint in self.upper_body]] = 0.0
+        solution, _, rank, _ = np.linalg.lstsq(rows, wanted, rcond=None)
+        if rank < len(rows):
+            raise RobotError(f"{self.name}: the legs do not determine the pose; bend them")
+        return np.asarray(solution)
 
     @classmethod
     @checked
@@ -187,6 +213,7 @@ class FloatingBaseBiped(Biped):
         lossless: bool = False,
         flat_feet: bool = False,
         sole: Sole | None = None,
+        upper_body: bool = False,
     ) -> FloatingBaseBiped:
         """Load a URDF whose root link is the trunk: x forward, y left, z up.
 
@@ -210,6 +237,8 @@ class FloatingBaseBiped(Biped):
             flat_feet: whether a biped stands on soles, which are found from the feet's collision
                 shapes. Joints that are in no leg are then held at 0, unless ``locked`` says where.
             sole: the left one, where it is not to be found.
+            upper_body: whether those of them that ``locked`` does not name move, and a task keeps
+                them at 0, or where their range is nearest to it.
 
         Raises:
             RobotError: if the file is missing, no URDF, no such robot, or lacks a foot; if a mass,
@@ -227,9 +256,12 @@ class FloatingBaseBiped(Biped):
         flat = flat_feet or sole is not None
         if flat and foot_radius is not None:
             raise RobotError(f"{path}: flat feet have no foot_radius: leave one of them out")
+        if upper_body and not flat:
+            raise RobotError(f"{path}: upper_body is of a robot on flat feet: give flat_feet too")
         if locked or flat:
             check_joint_names(path, tree, locked or ())
-            held = {*(locked or {}), *(joints_in_no_leg(tree, feet) if flat else ())}
+            others = joints_in_no_leg(tree, feet) if flat else set()
+            held = {*(locked or {}), *(mimics(tree).keys() & others if upper_body else others)}
             lock(path, tree, moving_joints(tree, held), locked or {})
             take_points(path, tree)
         spheres(path, tree, feet, foot_radius, foot_offset)

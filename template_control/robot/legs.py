@@ -64,6 +64,12 @@ def straight_legs(
     stands on its sole, which is level where all joints are at 0.
     """
     data, q = model.createData(), pin.neutral(model)
+    placing = {joint for leg in legs for joint in leg}
+    for joint in range(2, model.njoints) if flat else ():
+        if joint not in placing:
+            place = model.idx_qs[joint]
+            stops = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+            q[place] = min(max(0.0, stops[0]), stops[1])
     for leg in () if flat else legs:
         _turn_lateral(model, data, q, leg)
     axes = np.array(pin.computeJointJacobians(model, data, q)[3:])

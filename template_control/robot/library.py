@@ -195,7 +195,7 @@ def _files(entry: _Entry) -> list[Path]:
     return [Path(str(f.locate())) for f in files if f.name == entry.file]
 
 
-def _load(name: str | Path, kind: type[AnyBiped]) -> AnyBiped:
+def _load(name: str | Path, kind: type[AnyBiped], **more: Any) -> AnyBiped:
     """A shipped robot by the name that users know it by, or any by the path of its URDF."""
     text = str(name)
     if text.lstrip("\ufeff \n").startswith("<"):
@@ -204,7 +204,7 @@ def _load(name: str | Path, kind: type[AnyBiped]) -> AnyBiped:
             " file, and give the file's path"
         )
     if text not in _ENTRIES and (text.endswith(_FILES) or "/" in text):
-        return kind.from_urdf(text)
+        return kind.from_urdf(text, **more)
     path, entry = robot_path(text), _ENTRIES[text]
     given = entry.planar if kind is PlanarBiped else entry.floating
     if given is None and kind is PlanarBiped:
@@ -214,7 +214,7 @@ def _load(name: str | Path, kind: type[AnyBiped]) -> AnyBiped:
             f"robot {text!r} has no model with a floating base: give one of"
             f" {list(FLOATING_ROBOTS)} or a URDF file"
         )
-    robot = kind.from_urdf(path, **given)
+    robot = kind.from_urdf(path, **given, **more)
     robot.model.name = robot.name = text  # not its URDF's
     return robot
 
@@ -230,10 +230,14 @@ def load_robot(name: str | Path) -> PlanarBiped:
 
 
 @checked
-def load_floating_robot(name: str | Path) -> FloatingBaseBiped:
+def load_floating_robot(name: str | Path, *, upper_body: bool = False) -> FloatingBaseBiped:
     """A shipped robot by name, or any biped by the path of its URDF, with a floating base.
+
+    Args:
+        name: of the robot, or the path.
+        upper_body: see :meth:`FloatingBaseBiped.from_urdf`.
 
     Raises:
         RobotError: if there is no such robot or file, or it is planar.
     """
-    return _load(name, FloatingBaseBiped)
+    return _load(name, FloatingBaseBiped, upper_body=upper_body)

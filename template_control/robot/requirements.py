@@ -151,7 +151,7 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool
         )
     if flat:
         _check_flat(path, model, feet, legs)
-        _check_limits(path, model, [joint for leg in legs for joint in leg])
+        _check_limits(path, model, range(2, model.njoints))
         return
     most = _MOST if len(legs) == LEGS else _LEAST
     for leg, foot in zip(legs, feet, strict=True):

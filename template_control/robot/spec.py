@@ -51,6 +51,8 @@ class RobotSpec(Checked):
         masses: of links by name, instead of the URDF's [kg]; their inertias grow alike.
         flat_feet: whether a free robot stands on soles, as its feet's collision shapes have them;
             joints that are in no leg are then locked.
+        upper_body: whether those of them that ``locked`` does not name move instead, about where
+            they would be locked.
         groups: the feet of each of the template's two legs, by their places in the robot's
             ``feet``: those of a quadruped are its diagonal pairs, with which it trots, if not
             given; with the pairs of its sides it paces.
@@ -67,6 +69,7 @@ class RobotSpec(Checked):
     gravity: Positive | None = None
     masses: Mapping[str, Positive] = field(default_factory=dict)
     flat_feet: bool = False
+    upper_body: bool = False
     groups: tuple[tuple[Index, ...], ...] = ()
 
     def __post_init__(self) -> None:
@@ -101,15 +104,22 @@ class RobotSpec(Checked):
         """The robot as its URDF has it; see :meth:`load`."""
         own = {name: getattr(self, name) for name in _OF_A_URDF}
         given = {name: value for name, value in own.items() if value not in (None, (), {}, False)}
+        if self.upper_body and not (self.free and self.stands_flat):
+            raise ParameterError(
+                f"{self.model} has no upper body that moves: give a floating base on flat feet, or"
+                " leave upper_body out"
+            )
+        if not given and self.free:
+            return load_floating_robot(self.model, upper_body=self.upper_body)
         if not given:
-            return load_floating_robot(self.model) if self.free else load_robot(self.model)
+            return load_robot(self.model)
         if self.model in SHIPPED:
             names = ", ".join(name.replace("_", " ") for name in given)
             raise ParameterError(f"{names} go with a URDF, not with {self.model}: leave them out")
         if self.free:
             if self.sagittal_joints:
                 raise ParameterError("sagittal joints hold a robot in its plane: leave them out")
-            return FloatingBaseBiped.from_urdf(self.model, **given)
+            return FloatingBaseBiped.from_urdf(self.model, upper_body=self.upper_body, **given)
         if self.stands_flat:
             raise ParameterError("a robot in its plane has point feet: run one on flat feet free")
         return PlanarBiped.from_urdf(self.model, **given)

@@ -160,7 +160,7 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
         robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose.com[2]
     )
     robot.update(q, np.zeros(robot.nv))
-    rows, momentum = _rows(robot), robot.jacobians.momentum
+    rows, momentum = robot.placing_rows(), robot.jacobians.momentum
     weight = robot.mass * pose.com[2]
     if pose.in_flight:
         rows[3:6] = momentum
@@ -172,7 +172,7 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
     wanted[:3] = pose.com_velocity
     velocities[:, :3] = _by_contact(robot, pose, pose.feet_velocity)
     wanted[6:] = velocities.ravel()
-    v = _smallest(robot, rows, wanted)
+    v = robot.smallest_motion(rows, wanted)
     robot.update(q, v)
     return q, v
 
@@ -306,13 +306,13 @@ def _floating_configuration(
         return np.concatenate((robot.space.com - pose.com, turn, away.ravel()))
 
     def step(q: Array, error: Array) -> Array:
-        rows, r = _rows(robot), robot.foot_radius
+        rows, r = robot.placing_rows(), robot.foot_radius
         # The lowest point's path, not that of the material point which touches there.
         for foot in range(len(robot.feet) if r > 0.0 else 0):
             turning = _foot_turning(robot, q, foot)
             rows[6 + 3 * foot] += r * turning[1]
             rows[7 + 3 * foot] -= r * turning[0]
-        return _smallest(robot, rows, -error)
+        return robot.smallest_motion(rows, -error)
 
     return _newton(robot, q, error, step, _LONGEST, 100)
 
@@ -323,12 +323,6 @@ def _by_contact(robot: FloatingBaseBiped, pose: FloatingBasePose, values: Array)
     for leg, value in zip((pose.rear, 1 - pose.rear), values, strict=True):
         found[list(robot.groups[leg])] = value
     return found
-
-
-def _rows(robot: FloatingBaseBiped) -> Array:
-    """(6 + 3 n, nv) Jacobians of the CoM, the trunk's turning and all contacts; 6 rows of soles."""
-    j = robot.jacobians
-    return np.concatenate((j.com, j.turning, j.contact.reshape(-1, robot.nv)))
 
 
 def _foot_turning(robot: FloatingBaseBiped, q: Array, foot: int) -> Array:
@@ -344,14 +338,6 @@ def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:
         return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
     except np.linalg.LinAlgError:
         raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them") from None
-
-
-def _smallest(robot: FloatingBaseBiped, matrix: Array, right: Array) -> Array:
-    """The smallest solution: a leg may have a joint to spare. A RobotError if there is none."""
-    solution, _, rank, _ = np.linalg.lstsq(matrix, right, rcond=None)
-    if rank < len(matrix):
-        raise RobotError(f"{robot.name}: the legs do not determine the pose; bend them")
-    return np.asarray(solution)
 
 
 def _angular_momentum_row(robot: PlanarBiped, q: Array) -> Array:

@@ -35,6 +35,9 @@ PATCH = 6
 MOST_CONTACTS = 8
 """Contacts that a robot may have: room for as many is in the memory that compiled code shares."""
 
+MOST_SPARE = 32
+"""Joints that a robot may have which place no foot, for the same reason."""
+
 UP = 2
 """Index of the vertical direction; 0 is forward, 1 to the left."""
 
@@ -58,8 +61,8 @@ ROBOT_DATA = np.dtype(
         ("sole_centre", _F, (MOST_CONTACTS, 2)),  # of each patch from its toe, in its axes [m]
         ("sole_half", _F, (MOST_CONTACTS, 2)),  # half sides of each patch [m]
         ("spare", _I),  # number of spare joints
-        ("spare_joint", _I, (LEGS,)),  # their indices among the actuated joints
-        ("spare_angle", _F, (LEGS,)),  # where they rest [rad]
+        ("spare_joint", _I, (MOST_SPARE,)),  # their indices among the actuated joints
+        ("spare_angle", _F, (MOST_SPARE,)),  # where they rest [rad]
         # -- at the last update: forward, left, up; a planar robot's left is 0 --
         ("com", _F, (3,)),  # centre of mass [m]
         ("com_velocity", _F, (3,)),  # [m/s]

@@ -53,13 +53,18 @@ def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> No
             raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
 
 
-def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
-    """Names of the joints that neither are locked nor mimic a locked one."""
-    leaders = {
+def mimics(robot: ET.Element) -> dict[str, str]:
+    """Names of the joints that mimic others, with those of the latter."""
+    return {
         str(joint.get("name")): str(mimic.get("joint"))
         for joint in robot.findall("joint")
         for mimic in joint.findall("mimic")
     }
+
+
+def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
+    """Names of the joints that neither are locked nor mimic a locked one."""
+    leaders = mimics(robot)
     held = set(locked)
     for _ in leaders:  # one may mimic another that mimics
         held |= {name for name, leader in leaders.items() if leader in held}

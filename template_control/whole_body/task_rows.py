@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from template_control.compiled import compiled
-from template_control.robot.terms import UP, onward
+from template_control.robot.terms import MOST_SPARE, UP, onward
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 Array = NDArray[np.float64]
@@ -169,10 +169,9 @@ def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) ->
     """Write the rows of a :class:`SpareJointTask`; arguments as for :func:`write_rows`."""
     joints, nv = arrays[6], rows.shape[1] - 3
     base_dof = nv - joints.shape[1]
-    for row in range(2):
-        if row >= r.spare:
-            rows[row, nv + WEIGHT] = 0.0
-            continue
+    for row in range(r.spare, MOST_SPARE):
+        rows[row, nv + WEIGHT] = 0.0
+    for row in range(r.spare):
         joint = r.spare_joint[row]
         rows[row, base_dof + joint] = 1.0
         away = task.gains[0] * (r.spare_angle[row] - joints[0, joint])

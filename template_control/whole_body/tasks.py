@@ -15,7 +15,7 @@ from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.errors import ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.robot import Robot
-from template_control.robot.terms import UP
+from template_control.robot.terms import MOST_SPARE, UP
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import (
     PER_ACCELERATION_SQUARED,
@@ -64,8 +64,8 @@ class CompiledTask(Checked):
         """
         found = np.zeros(1, TASK)
         found["kind"], found["first"] = self.kind, first
-        found["leg"], weights = getattr(self, "leg", 0), self.weights
-        found["contact"] = getattr(self, "contact", 0)
+        found["leg"], found["contact"] = getattr(self, "leg", 0), getattr(self, "contact", 0)
+        weights = self.weights[: found["weight"].shape[1]]
         found["weight"][0, : len(weights)] = weights
         found["gains"][0, : len(self.numbers)] = self.numbers
         return found
@@ -294,10 +294,11 @@ class SideFootTask(CompiledTask):
 
 @dataclass(frozen=True)
 class SpareJointTask(CompiledTask):
-    """Two rows, one for each leg of a biped: q'' = kp (q0 - q) - kd q'.
+    """A row for each joint that places no foot: q'' = kp (q0 - q) - kd q'.
 
-    A foot is placed by three hinges. Of four, the one about the axis that is nearest to the
-    vertical turns the leg about itself. Without it the rows are empty.
+    A point foot is placed by three hinges. Of four, the one about the axis that is nearest to the
+    vertical turns the leg about itself. Arms and a waist that move are in no leg. There is room for
+    ``MOST_SPARE`` rows, and those beyond a robot's joints are empty.
 
     Attributes:
         weight: [s^4/rad^2].
@@ -313,7 +314,7 @@ class SpareJointTask(CompiledTask):
     @property
     def weights(self) -> tuple[float, ...]:
         """See :class:`~.task.Task`."""
-        return self.weight, self.weight
+        return (self.weight,) * MOST_SPARE
 
 
 @dataclass(frozen=True)

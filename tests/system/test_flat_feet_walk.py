@@ -16,8 +16,8 @@ from template_control.view.replay.film import Stage
 from template_control.view.replay.playback import playback
 
 
-def walk(robot, steps, **given):
-    spec = tc.robot.RobotSpec(robot, free=True)
+def walk(robot, steps, upper_body=False, **given):
+    spec = tc.robot.RobotSpec(robot, free=True, upper_body=upper_body)
     return tc.simulate(tc.Experiment(spec, motion=GaitSpec(speed=0.6), steps=steps, **given))
 
 
@@ -80,6 +80,15 @@ def test_g1_walks_and_is_recorded(tmp_path):
 @pytest.mark.slow(6)
 def test_talos_walks_with_the_same_tuning():
     check(walk("talos", 4), 4)
+
+
+@pytest.mark.slow(7)
+def test_g1_walks_with_all_its_joints():
+    record = walk("g1", 4, upper_body=True)
+    check(record, 4)
+    assert len(record.joints) == 29
+    arms_and_waist = record.q[:, 7 + 12 :]
+    assert np.abs(arms_and_waist).max() < 0.05
 
 
 @pytest.mark.slow(10)

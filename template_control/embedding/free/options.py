@@ -139,6 +139,7 @@ _SOLE_SINGLE = PhaseControl(
         FootTask(weight=(0.1, 1.0)),
         SideFootTask(weight=0.1),
         SoleTask(),
+        SpareJointTask(),
     ),
     swings=(Leg.FRONT,),
 )
@@ -154,6 +155,7 @@ _SOLE_RUNNING = PhaseControl(
         FootTask(),
         SideFootTask(),
         SoleTask(),
+        SpareJointTask(),
     ),
     swings=(Leg.FRONT,),
     swing=_SOLE_SWING,
@@ -163,6 +165,7 @@ _SOLE_DOUBLE = PhaseControl(
         ComTask((10.0, 10.0), _SOLE_GAINS, on_point=True),
         SwayTask(10.0),
         OrientationTask((4.0, 4.0, 0.4)),
+        SpareJointTask(),
     ),
     unload_legs=(Leg.REAR,),
 )
@@ -175,6 +178,7 @@ SOLE_PHASES: Phases = {
         (
             OrientationTask((0.2, 0.2, 0.02)),
             *(task(leg) for leg in Leg for task in (FootTask, SideFootTask, SoleTask)),
+            SpareJointTask(),
         ),
         _SOLE_RUNNING,
         _SOLE_DOUBLE,

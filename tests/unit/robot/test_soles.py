@@ -1,13 +1,14 @@
 """Flat feet: soles found in spheres, boxes and meshes, or given, and robots that have none."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import template_control as tc
-from template_control.errors import RobotError
+from template_control.errors import ParameterError, RobotError
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.sole import Sole
@@ -45,6 +46,47 @@ def box_mesh(path):
     faces += [(3, 4, 8), (3, 8, 7), (1, 3, 7), (1, 7, 5), (2, 6, 8), (2, 8, 4)]
     lines = [f"v {x} {y} {z}" for x, y, z in corners] + [f"f {a} {b} {c}" for a, b, c in faces]
     path.write_text("\n".join(lines))
+
+
+@pytest.fixture(scope="module")
+def whole():
+    return load_floating_robot("g1", upper_body=True)
+
+
+def test_an_upper_body_that_moves_rests_where_it_would_be_locked(g1, whole):
+    assert (len(whole.joint_names), whole.nv, len(whole.upper_body)) == (29, 35, 17)
+    assert [angle for _, angle in whole.spare] == [0.0] * 17
+    for name in ("mass", "leg_length", "ankle_height", "toe_ahead", "sway", "leg_mass"):
+        assert getattr(whole, name) == pytest.approx(getattr(g1, name), rel=1e-9), name
+    pose = FloatingBasePose(
+        com=np.array([0.0, 0.05, 0.6]),
+        com_velocity=np.array([0.5, 0.1, 0.0]),
+        feet=np.array([[0.0, 0.07, 0.0], [0.2, -0.07, 0.0]]),
+        feet_velocity=np.zeros((2, 3)),
+        rear=0,
+    )
+    for ours, theirs in zip(
+        floating_state_in(whole, pose), floating_state_in(g1, pose), strict=True
+    ):
+        np.testing.assert_allclose(ours[: len(theirs)], theirs, atol=1e-9)
+        assert np.all(ours[len(theirs) :] == 0.0)
+    np.testing.assert_allclose(whole.space.momentum, g1.space.momentum, atol=1e-9)
+
+
+def test_joints_of_an_upper_body_may_stay_locked():
+    spec = RobotSpec(str(robot_path("g1")), G1_FEET, free=True, flat_feet=True, upper_body=True)
+    held = {"waist_roll_joint": 0.1, "waist_pitch_joint": -0.1}
+    robot = RobotSpec.load(replace(spec, locked=held))
+    assert len(robot.upper_body) == 15
+    assert not set(held) & set(robot.joint_names)
+
+
+@pytest.mark.parametrize("model", ["five-link", "bolt"])
+def test_an_upper_body_goes_with_flat_feet(model):
+    with pytest.raises(ParameterError, match=f"{model} has no upper body that moves"):
+        RobotSpec(model, free=model == "bolt", upper_body=True).load()
+    with pytest.raises(RobotError, match="upper_body is of a robot on flat feet"):
+        FloatingBaseBiped.from_urdf(robot_path("five-link-3d"), upper_body=True)
 
 
 def test_soles_of_spheres(g1):
