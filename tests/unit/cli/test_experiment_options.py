@@ -81,6 +81,7 @@ def written_and_read(experiment, tmp_path):
         ("--foot-offset 0 0 -0.1", "robot.foot_offset", (0.0, 0.0, -0.1)),
         ("--lossless", "robot.lossless", True),
         ("--flat-feet", "robot.flat_feet", True),
+        ("--upper-body", "robot.upper_body", True),
         ("--gravity 1.62", "robot.gravity", 1.62),
         ("--mass trunk=60", "robot.masses", {"trunk": 60.0}),
         ("--plant-gravity 9.7", "world.gravity", 9.7),
