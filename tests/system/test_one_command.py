@@ -86,7 +86,7 @@ def test_what_a_planar_robot_cannot_do_is_refused():
 
 @pytest.mark.slow(seconds=7)
 def test_go2_goes_aside_and_turns_and_comes_back_backward():
-    rows = ((0.0, 0.5, 0.2, 0.3), (3.5, -0.4, 0.0, 0.0))
+    rows = ((0.0, 0.5, 0.2, 0.5), (3.5, -0.4, 0.0, 0.0))
     motion = VelocityProfile(rows, duration=10.0, foreseen=False, gaits=("stand", "walk"))
     record = tc.simulate(tc.Experiment(tc.load_floating_robot("go2"), motion))
     assert isinstance(record, tc.run.FloatingRecord)
@@ -101,6 +101,9 @@ def test_go2_goes_aside_and_turns_and_comes_back_backward():
     assert forward[back].mean() == pytest.approx(-0.4, abs=0.02)
     assert aside[back].mean() == pytest.approx(0.0, abs=0.01)
     assert record.heading[-1] > 0.6
+    # The trunk turns by 0.12 rad a step at most, whatever is commanded.
+    turned = record.section_velocity[1:-1, 2] * np.diff(record.section_time)[1:]
+    assert 0.1 < turned[record.section_time[1:-1] < 3.5].max() < 0.13
     # The pairs of feet step behind each other, whichever way the trunk faces.
     assert np.abs(step_widths(record)).max() < 0.06
     assert record.section_velocity[-2] == pytest.approx((-0.4, 0.0, 0.0), abs=0.01)

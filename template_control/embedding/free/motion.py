@@ -55,6 +55,9 @@ RUN_RAMP = 0.15  # and of a run's, which leans into its turns
 # the trunk only by pushing to and fro. With a run's ramp Bolt's fell behind by 0.25 rad as the turn
 # changed from 0.3 to -0.34 rad/s.
 TURN_RAMPS: dict[str, float] = {StrideKind.HOP: 0.045}
+# Largest turn of a walking step on pairs of feet [rad]. The trunk turns over the feet that stand;
+# further, and a knee of Go2's came to its stop before its pair lifted off, which braked the robot.
+_PAIR_TURN = 0.12
 BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference template]
 # A trunk that turns from its course turns the course, at this rate at most [rad/s, of the reference
 # template], and comes there with this time constant [s, the same].
@@ -254,7 +257,11 @@ class LateralMotion:
         side_ramp, walk_ramp, run_ramp = self._ramps
         turn_ramp = self._own_ramps.get(gait.stride, walk_ramp if node.stance else run_ramp)
         most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
-        self._now += np.clip(self._wanted(course) - self._now, -most, most)
+        wanted = self._wanted(course)
+        if node.stance and self.robot.paired:
+            rate = _PAIR_TURN / gait.step_duration
+            wanted[1] = min(max(wanted[1], -rate), rate)
+        self._now += np.clip(wanted - self._now, -most, most)
         left, turn, self._turns = (gait.step_duration * self._now).tolist()
         planner.wish = replace(planner.wish, left=left, turn=turn - self._turns)
         planner.walk(gait)

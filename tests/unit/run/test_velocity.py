@@ -91,7 +91,7 @@ def test_a_robot_on_two_points_hops_below_its_slowest_walk():
 
 
 @pytest.mark.parametrize(
-    ("wanted", "goes"), [((0.6, 0.0), 0.6), ((0.3, 0.1), 0.5), ((0.1, -0.1), 0.0)]
+    ("wanted", "goes"), [((0.4, 0.0), 0.4), ((0.2, 0.1), 0.35), ((0.1, -0.1), 0.0)]
 )
 def test_a_quadruped_goes_no_slower_than_its_slowest_walk(wanted, goes):
     go2 = tc.load_floating_robot("go2")
