@@ -28,7 +28,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
-from template_control.robot.terms import FLOATING_DOF, UP, gather_floating
+from template_control.robot.terms import FLOATING_DOF, MOST_SPARE, UP, gather_floating
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import (
     check_joint_names,
@@ -150,6 +150,11 @@ class FloatingBaseBiped(Biped):
         )
         angles = self._neutral[model.nq - len(self.joint_names) :]
         self.spare = tuple((j, float(angles[j])) for j in (*turning, *self.upper_body))
+        if len(self.spare) > MOST_SPARE:
+            raise RobotError(
+                f"{self.path}: {len(self.upper_body)} joints are in no leg, and {MOST_SPARE} may"
+                " move: name others, such as those of hands, among the `locked`"
+            )
         now = self.data[0]
         now["spare"] = len(self.spare)
         for i, (joint, angle) in enumerate(self.spare):

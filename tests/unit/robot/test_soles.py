@@ -9,6 +9,7 @@ import pytest
 
 import template_control as tc
 from template_control.errors import ParameterError, RobotError
+from template_control.robot import floating_biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.sole import Sole
@@ -79,6 +80,12 @@ def test_joints_of_an_upper_body_may_stay_locked():
     robot = RobotSpec.load(replace(spec, locked=held))
     assert len(robot.upper_body) == 15
     assert not set(held) & set(robot.joint_names)
+
+
+def test_an_upper_body_of_too_many_joints_is_refused(monkeypatch):
+    monkeypatch.setattr(floating_biped, "MOST_SPARE", 16)
+    with pytest.raises(RobotError, match="17 joints are in no leg, and 16 may move: name others"):
+        load_floating_robot("g1", upper_body=True)
 
 
 @pytest.mark.parametrize("model", ["five-link", "bolt"])
