@@ -49,17 +49,6 @@ DEPRECATED = {
 }
 """Old name -> new one, as "package:name" of a public package."""
 
-_OLD = "template_control.run.old"
-ADAPTED = {
-    "template_control.RunConfig": _OLD,
-    "template_control.SimulationOptions": _OLD,
-    "template_control.run.RunConfig": _OLD,
-    "template_control.run.SimulationOptions": _OLD,
-    "template_control.robustness.Situation": _OLD,
-    "template_control.robustness.Subject": _OLD,
-}
-"""Old name -> module of what makes an :class:`~.Experiment` of its arguments."""
-
 
 def attach_stub(
     package: str, file: str
@@ -73,15 +62,10 @@ def attach_stub(
 
     def attribute_or_deprecated(name: str) -> object:
         old = f"{package}.{name}"
-        if old in ADAPTED:
-            home, new = "template_control", "Experiment"
-        elif old in DEPRECATED:
-            home, _, new = DEPRECATED[old].partition(":")
-        else:
+        if old not in DEPRECATED:
             return attribute(name)
+        home, _, new = DEPRECATED[old].partition(":")
         warnings.warn(f"{old} is deprecated: use {home}.{new}", DeprecationWarning, stacklevel=2)
-        if old in ADAPTED:
-            return getattr(importlib.import_module(ADAPTED[old]), name)
         return getattr(importlib.import_module(home), new)
 
     return attribute_or_deprecated, directory, names

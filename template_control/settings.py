@@ -47,15 +47,10 @@ _SCALARS = {
 }
 
 
-def read(
-    kind: type[T],
-    path: str | Path,
-    translated: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
-) -> T:
+def read(kind: type[T], path: str | Path) -> T:
     """A dataclass from a TOML file; keys that are left out keep their defaults.
 
-    ``translated`` makes today's table from one of an earlier version. A ParameterError names the
-    file and the key.
+    A ParameterError names the file and the key.
     """
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
@@ -64,7 +59,7 @@ def read(
     except (ValueError, RecursionError) as error:  # of the parser, of UTF-8, of dates, of numbers
         raise ParameterError(f"{path} is no TOML: {error}") from None
     try:
-        return from_table(kind, table if translated is None else translated(table))
+        return from_table(kind, table)
     except ValueError as error:
         raise ParameterError(f"{path}: {error}") from None
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from template_control.checks import option_types as values
@@ -13,18 +12,18 @@ from template_control.cli.flags import ALL, SCENARIO
 from template_control.cli.interrupts import INTERRUPTED
 from template_control.cli.report import (
     NO_STANDS,
-    Kept,
     add_output_options,
-    print_route_table,
+    add_template,
     print_table,
     run_and_keep,
-    summarise_route,
 )
 from template_control.errors import ParameterError
-from template_control.run.experiment import Experiment, PreparedExperiment
+from template_control.run.experiment import Experiment
 from template_control.run.specs import GaitSpec
 from template_control.run.summary import summarise
-from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.gaits.gait import Gait
+from template_control.slip.scenario.route import Route
+from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.terminal import plain_console
 
@@ -42,22 +41,20 @@ class Motion:
     Attributes:
         doing: in front of the progress bar.
         about: first sentences of the description.
-        report: does the run, and returns what is kept of it.
         default: experiment where no option says otherwise.
-        file: whether the scenario's file is named without a flag.
+        template: whether a scenario, named without a flag, is simulated on the template too.
     """
 
     doing: str
     about: str
-    report: Callable[[argparse.Namespace, Experiment, PreparedExperiment, str], Kept]
     default: Experiment = field(default_factory=Experiment)
-    file: bool = False
+    template: bool = False
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
         """Add the command's description and options."""
         parser.description = self.about + _KEPT
-        flags = [flag for flag in ALL if not (self.file and flag is SCENARIO)]
-        if self.file:
+        flags = [flag for flag in ALL if not (self.template and flag is SCENARIO)]
+        if self.template:
             parser.add_argument(
                 "scenario",
                 nargs="?",
@@ -71,62 +68,45 @@ class Motion:
     def run(self, options: argparse.Namespace) -> int:
         """Do the run; returns 0, 1 after a fall, 130 after Ctrl-C."""
         experiment = experiment_from(options, self.default)
-        kept = self.report(options, experiment, experiment.prepare(), self.doing)
+        prepared = experiment.prepare()
+        template = _template_of(prepared.motion) if self.template else None
+        kept = run_and_keep(options, experiment, prepared, self.doing, template)
+        figures = summarise(kept.record, kept.path)
+        if template is not None:
+            add_template(figures, kept.record, template)
+        if options.json:
+            print(json.dumps(figures))
+        else:
+            print_table(figures)
         if kept.interrupted():
             return INTERRUPTED
         return 1 if kept.record.fell else 0
 
 
-def _alone(
-    options: argparse.Namespace, experiment: Experiment, prepared: PreparedExperiment, doing: str
-) -> Kept:
-    """The robot's run alone."""
-    kept = run_and_keep(options, experiment, prepared, doing)
-    figures = summarise(kept.record, kept.path)
-    if options.json:
-        print(json.dumps(figures))
-    else:
-        print_table(figures)
-    return kept
-
-
-def _with_template(
-    options: argparse.Namespace, experiment: Experiment, prepared: PreparedExperiment, doing: str
-) -> Kept:
-    """The robot's run through a scenario next to its template's."""
-    route = prepared.motion
-    if not isinstance(route, ScenarioRoute):
+def _template_of(motion: Gait | Route) -> ScenarioRecord:
+    """The scenario of a run on the robot's template; a ParameterError if there is none."""
+    if not isinstance(motion, ScenarioRoute):
         raise ParameterError("no scenario is given: name a file, such as examples/example_one.toml")
-    if route.scenario.stands:
+    if motion.scenario.stands:
         plain_console(stderr=True).print(NO_STANDS)
     with plain_console(stderr=True).status("the template"):
-        template = simulate_scenario(route.scenario)
-    kept = run_and_keep(options, experiment, prepared, doing, template)
-    figures = summarise_route(kept.record, template, kept.path)
-    if options.json:
-        print(json.dumps(figures))
-    else:
-        print_route_table(figures)
-    return kept
+        return simulate_scenario(motion.scenario)
 
 
 WALK = Motion(
     "walking",
     "Walk a robot in a physics engine or on an ideal plant: a planner on the SLIP template chooses"
     " each step, a whole-body QP makes the robot follow it.",
-    _alone,
 )
 RUN = Motion(
     "running",
     "Run a robot in a physics engine or on an ideal plant: a planner on the SLIP template chooses"
     " each stride from apex to apex, a whole-body QP makes the robot follow it.",
-    _alone,
     Experiment(motion=GaitSpec("run")),
 )
 GO = Motion(
     "going",
     "Take a robot through a scenario (TOML): a speed profile with gait switches. The same scenario"
     " is simulated on the robot's template (template.npz), and shown next to it.",
-    _with_template,
-    file=True,
+    template=True,
 )

@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from template_control import view
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
 from template_control.run.record import Record, load_record
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import writing
-from template_control.view.figures import FIGURES, FORMATS, FREE_FIGURES, SOLE_FIGURES
+from template_control.view.figures import FIGURES, FREE_FIGURES, SOLE_FIGURES, save_figures
 from template_control.view.scenario_figures import ROUTE_FIGURES
-from template_control.view.style import DPI, Look
+from template_control.view.style import DPI, FORMATS, Look
 
 TEMPLATE = "template.npz"
 """File of the template's run that goes with a robot's run through a scenario."""
@@ -81,14 +80,8 @@ def draw(
     ``template`` is the same scenario on the robot's template, of a run that has one.
     """
     look = Look(options.start, options.end, not options.no_title)
-    drawn = {"dpi": options.dpi, "look": look, "file_format": options.format}
-    names = options.figures
-    of_route = [] if template is None else [n for n in ROUTE_FIGURES if names is None or n in names]
-    own = None if names is None else [name for name in names if name not in of_route]
-    paths = view.save_figures(record, folder, figures=own, **drawn)
-    if template is not None:
-        paths += view.save_route_figures(record, template, folder, figures=of_route, **drawn)
-    return paths
+    how = {"dpi": options.dpi, "look": look, "file_format": options.format}
+    return save_figures(record, folder, figures=options.figures, template=template, **how)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -24,8 +24,7 @@ from template_control.run.specs import GaitSpec
 from template_control.storage import Files
 from template_control.sweep.executor import workers
 from template_control.terminal import show, table
-from template_control.view.figures import figure_style
-from template_control.view.style import save_figure
+from template_control.view.style import figure_style, save_figure
 
 T = TypeVar("T")
 

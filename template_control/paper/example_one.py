@@ -17,6 +17,7 @@ from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 from template_control.view.scenario_figures import energy_figure, route_figures, scenario_figure
+from template_control.view.style import Look
 
 _TOP_SPEED = 5.0
 _PAPER_STIFFNESS = 28.2e3
@@ -165,5 +166,8 @@ def fig10_on(robot_name: str) -> Reproduction:
             "The robot's apexes are as high as suits its knees, not 0.98 m.",
             "Wanted is the profile, which waits for nobody.",
         ),
-        figures={f"fig10_{name}": f for name, f in route_figures(record, template).items()},
+        figures={
+            f"fig10_{name}": draw(record, Look())
+            for name, draw in route_figures(record, template).items()
+        },
     )

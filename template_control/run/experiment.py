@@ -329,7 +329,7 @@ class Experiment(Checked):
             ParameterError: naming the file and the key, if it cannot be read, has an unknown key
                 or a value of another type or out of its range.
         """
-        return settings.read(Experiment, path, _from_version_0_1)
+        return settings.read(Experiment, path)
 
 
 @dataclass(frozen=True)
@@ -482,17 +482,3 @@ def _check_strictly(motion: Gait | Route, planner: Planner | Planners) -> None:
 
 
 _HEAD = "# template-control walk --config FILE repeats this run; so does run, for a run.\n"
-_OLD_NAMES = {"plant": "world", "embedding": "controller"}
-
-
-def _from_version_0_1(table: dict[str, Any]) -> dict[str, Any]:
-    """A table of version 0.1, which had simulation, gait and scenario, with the keys of today."""
-    old = {name: table[name] for name in ("simulation", "gait", "scenario") if name in table}
-    if not all(isinstance(part, dict) for part in old.values()):
-        return table  # which the reader refuses
-    new = {name: value for name, value in table.items() if name not in old}
-    new |= {_OLD_NAMES.get(k, k): value for k, value in old.get("simulation", {}).items()}
-    for kind in ("gait", "scenario"):
-        if kind in old:
-            new["motion"] = {"kind": kind, **old[kind]}
-    return new

@@ -38,8 +38,12 @@ class Fact(Generic[T]):
         return self if facts is None else self._make(facts.metadata[self._name])
 
 
-def _joints_of_legs(entry: Any) -> tuple[tuple[int, ...], ...]:
+def _indices(entry: Any) -> tuple[tuple[int, ...], ...]:
     return tuple(tuple(leg) for leg in entry)
+
+
+def _rows_of_four(entry: Any) -> Array:
+    return np.array(entry).reshape(-1, 4)
 
 
 def _phases(entry: Any) -> tuple[Phase, ...]:
@@ -96,7 +100,10 @@ class Facts:
     trunk_com = Fact(float)
     joints: Fact[tuple[str, ...]] = Fact(tuple)
     feet: Fact[tuple[str, ...]] = Fact(tuple)
-    legs = Fact(_joints_of_legs)
+    groups = Fact(_indices)
+    legs = Fact(_indices)
+    hinges = Fact(_indices)
+    soles = Fact(_rows_of_four)
     torque_limit: Fact[Array] = Fact(np.array)
     velocity_limit: Fact[Array] = Fact(np.array)
     nodes: Fact[tuple[str, ...]] = Fact(tuple)
@@ -121,26 +128,7 @@ class Facts:
     summary = Fact(Statistics.read)
     sections: Fact[tuple[str, ...]] = Fact(tuple)
     strides: Fact[tuple[str, ...]] = Fact(tuple)
-
-    @property
-    def groups(self) -> tuple[tuple[int, ...], ...]:
-        """See the class; runs recorded before there were several contacts are of bipeds."""
-        return _joints_of_legs(self.metadata.get("groups", ((0,), (1,))))
-
-    @property
-    def hinges(self) -> tuple[tuple[int, ...], ...]:
-        """See the class; runs recorded before there were flat feet have legs that end in a knee."""
-        return _joints_of_legs(self.metadata.get("hinges") or [leg[-2:] for leg in self.legs])
-
-    @property
-    def soles(self) -> Array:
-        """See the class; runs recorded before there were flat feet have none."""
-        return np.array(self.metadata.get("soles", ())).reshape(-1, 4)
-
-    @property
-    def section_course(self) -> Array:
-        """See the class; runs recorded before there were courses have none."""
-        return np.array(self.metadata.get("courses", ())).reshape(-1, 4)
+    section_course = Fact(_rows_of_four, "courses")
 
     @property
     def weight(self) -> float:

@@ -34,6 +34,7 @@ _METADATA: dict[str, tuple[type, ...]] = {
     **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds", "ticks"), (float, int)),
     **dict.fromkeys(("gait_mean_speed", "gait_flight_share"), (float, int)),
     **dict.fromkeys(("joints", "torque_limit", "velocity_limit", "feet", "legs"), (list,)),
+    **dict.fromkeys(("groups", "hinges", "soles", "courses"), (list,)),
     **dict.fromkeys(("nodes", "phases", "stiffness_slots", "sections", "strides"), (list,)),
     **dict.fromkeys(("gait_state", "gait_controls"), (list,)),
     **dict.fromkeys(("template", "options", "summary"), (dict,)),
@@ -331,8 +332,6 @@ class FloatingRecord(Record):
     @property
     def facing(self) -> Array:
         """(T,) angle from the way that the robot goes, the heading frame's x, to ``heading``."""
-        if not len(self.section_course):
-            return np.zeros(len(self.time))
         half = 0.5 * self.duration / max(len(self.tick_seconds), 1)  # of a tick
         begun = np.searchsorted(self.section_time - half, self.time, side="right") - 1
         return self.section_course[np.maximum(begun, 0), 3]

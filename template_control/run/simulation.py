@@ -9,14 +9,12 @@ from contextlib import suppress
 from template_control.checks.checked import checked
 from template_control.run.experiment import STEPS, Experiment
 from template_control.run.live import LiveRun
-from template_control.run.old import accepts_old_call
 from template_control.run.options import check_pushes
 from template_control.run.record import Record, RunInterrupted, keep, one_line
 
 _LOG = logging.getLogger(__name__)
 
 
-@accepts_old_call
 @checked
 def simulate(experiment: Experiment, progress: Callable[[int], None] | None = None) -> Record:
     """Run an experiment and record it; a fall ends the run and raises nothing.

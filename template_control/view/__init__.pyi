@@ -5,7 +5,6 @@ from .live.drive import Drive as Drive
 from .live.drive import drive as drive
 from .replay.replay import save_film as save_film
 from .replay.replay import save_html as save_html
-from .scenario_figures import save_route_figures as save_route_figures
 from .scenario_figures import save_scenario_figures as save_scenario_figures
 from .stability_figures import basin_figure as basin_figure
 from .stability_figures import branch_figure as branch_figure

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
@@ -19,7 +16,9 @@ from template_control.checks.ranges import Count
 from template_control.errors import ParameterError
 from template_control.run.record import FloatingRecord, Record, SoleRecord
 from template_control.slip.automaton.vocabulary import Event, Phase
+from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.replay.playback import stances
+from template_control.view.scenario_figures import route_figures
 from template_control.view.state_figures import (
     energies,
     phase_portrait,
@@ -35,9 +34,12 @@ from template_control.view.style import (
     TEMPLATE,
     TRUNK,
     WINDOW,
+    Draw,
+    Format,
     Look,
     as_text,
     feet_shown,
+    figure_style,
     finish,
     legs_shown,
     mark_limits,
@@ -48,7 +50,6 @@ from template_control.view.style import (
 )
 
 Array = NDArray[np.float64]
-Draw = Callable[[Any, Look], Figure]
 
 _LOOK = Look()
 _POSES = 0.06  # [s] from one pose of the stick diagram to the next
@@ -329,25 +330,32 @@ SOLE_FIGURES: dict[str, Draw] = {"pressure": pressure}
 _PLANAR_ONLY = ("energies", "turning", "apex_return")
 
 
-def figures_of(record: Record) -> dict[str, Draw]:
-    """The figures that have something to show of a run: apexes need two that follow each other."""
+def figures_of(record: Record, template: ScenarioRecord | None = None) -> dict[str, Draw]:
+    """The figures that have something to show of a run: apexes need two that follow each other.
+
+    Args:
+        record: the run.
+        template: of a run through a scenario, the same one on the robot's template.
+    """
+    of_route = {} if template is None else route_figures(record, template)
     if isinstance(record, FloatingRecord):
         shared = {name: draw for name, draw in FIGURES.items() if name not in _PLANAR_ONLY}
         own = SOLE_FIGURES if isinstance(record, SoleRecord) else {}
-        return {**shared, **FREE_FIGURES, **own}
+        return {**shared, **FREE_FIGURES, **own, **of_route}
     names = [record.sections[i] for i in record.section]
-    if (Event.APEX.name, Event.APEX.name) in pairwise(names):
-        return FIGURES
-    return {name: draw for name, draw in FIGURES.items() if draw is not apex_return}
+    idle = () if (Event.APEX.name, Event.APEX.name) in pairwise(names) else ("apex_return",)
+    return {name: draw for name, draw in FIGURES.items() if name not in idle} | of_route
 
 
-def _chosen(record: Record, names: Sequence[str] | None) -> dict[str, Draw]:
-    """Figures of a run by name.
+def _chosen(
+    record: Record, names: Sequence[str] | None, template: ScenarioRecord | None = None
+) -> dict[str, Draw]:
+    """Figures of a run by name; ``template`` as of :func:`figures_of`.
 
     A ParameterError if there is no figure of a name, a RecordError if the run cannot be shown.
     """
     record.check_shown()
-    known = figures_of(record)
+    known = figures_of(record, template)
     for name in names or ():
         if name not in known:
             raise ParameterError(
@@ -376,16 +384,6 @@ def plot(record: Record, figure: str = "stick_diagram", look: Look | None = None
         return draw(record, look or _LOOK)
 
 
-def figure_style() -> AbstractContextManager[None]:
-    """Type and spines of all figures; letters in a PDF stay letters."""
-    look: dict[Any, Any] = {"font.size": 9, "pdf.fonttype": 42, "svg.fonttype": "none"}
-    return mpl.rc_context({**look, "axes.spines.top": False, "axes.spines.right": False})
-
-
-FORMATS = ("png", "pdf", "svg")
-Format = Literal["png", "pdf", "svg"]
-
-
 @checked
 def save_figures(
     record: Record,
@@ -394,8 +392,9 @@ def save_figures(
     figures: Sequence[str] | None = None,
     look: Look | None = None,
     file_format: Format = "png",
+    template: ScenarioRecord | None = None,
 ) -> list[Path]:
-    """Draw the :data:`FIGURES` of a run into files.
+    """Draw the figures of a run into files.
 
     Args:
         record: the run.
@@ -404,6 +403,8 @@ def save_figures(
         figures: names; None: those that :func:`figures_of` names.
         look: part of the run, and whether the titles stand in the figures.
         file_format: of the files.
+        template: of a run through a scenario, the same one on the robot's template: there are
+            figures of both then.
 
     Returns:
         The paths of the files.
@@ -414,7 +415,7 @@ def save_figures(
     """
     paths = []
     with figure_style():
-        for name, draw in _chosen(record, figures).items():
+        for name, draw in _chosen(record, figures, template).items():
             path = Path(folder) / f"{name}.{file_format}"
             paths.append(save_figure(draw(record, look or _LOOK), path, dpi))
     return paths

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,22 +11,20 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from template_control.checks.checked import checked
-from template_control.checks.ranges import Count
 from template_control.run.record import Record
 from template_control.run.summary import STANDING
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.scenario.run import ScenarioRecord
-from template_control.view.figures import Format, figure_style
 from template_control.view.replay.playback import stances
 from template_control.view.state_figures import leg_stiffness, template_energies
 from template_control.view.style import (
     COM,
-    DPI,
     LEFT,
     RIGHT,
     TEMPLATE,
     TRANSITIONS,
     TRUNK,
+    Draw,
     Look,
     as_text,
     finish,
@@ -161,7 +159,7 @@ def _template_begins(record: Record) -> tuple[float, float]:
     return begin, float(np.interp(begin, record.time, record.com[:, 0]))
 
 
-def route_figure(record: Record, template: ScenarioRecord, look: Look = _LOOK) -> Figure:
+def route_figure(template: ScenarioRecord, record: Record, look: Look = _LOOK) -> Figure:
     """Speed, path of the CoM with footholds, leg stiffnesses and torques.
 
     ``template`` is the same scenario on the robot's template; where the robot stands first, it
@@ -238,46 +236,10 @@ def transition_energies(record: Record, look: Look = _LOOK) -> Figure:
     return _around_transitions(record, named, as_text(record.robot_name), look)
 
 
-def route_figures(
-    record: Record, template: ScenarioRecord, look: Look = _LOOK
-) -> dict[str, Figure]:
+def route_figures(record: Record, template: ScenarioRecord) -> dict[str, Draw]:
     """Figures of a way through a scenario, by name; without transitions there are no energies.
 
     ``template`` is the same scenario on the robot's template.
     """
-    figures = {"scenario": route_figure(record, template, look)}
-    if _transitions(record):
-        figures["transitions"] = transition_energies(record, look)
-    return figures
-
-
-@checked
-def save_route_figures(
-    record: Record,
-    template: ScenarioRecord,
-    folder: str | Path,
-    dpi: Count = DPI,
-    figures: Sequence[str] | None = None,
-    look: Look | None = None,
-    file_format: Format = "png",
-) -> list[Path]:
-    """Write the :func:`route_figures`.
-
-    Args:
-        record: the robot's run.
-        template: the same scenario on the robot's template.
-        folder: where the files go; it must exist.
-        dpi: dots per inch of pictures made of dots.
-        figures: names; None: all. A run without transitions has no figure of them.
-        look: part of the run, and whether the titles stand in the figures.
-        file_format: of the files.
-
-    Returns:
-        The paths of the files.
-    """
-    with figure_style():
-        return [
-            save_figure(figure, Path(folder) / f"{name}.{file_format}", dpi)
-            for name, figure in route_figures(record, template, look or _LOOK).items()
-            if figures is None or name in figures
-        ]
+    figures: dict[str, Draw] = {"scenario": partial(route_figure, template)}
+    return figures | ({"transitions": transition_energies} if _transitions(record) else {})

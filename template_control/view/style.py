@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -38,6 +40,14 @@ _GREY, _GREEN = "0.92", 0.15  # of the shading; the green's share of COM
 _MOST_POINTS = 20_000  # of a line that shows a whole run
 _ROOMY = 1.6  # of the data: a limit further away would leave the panel empty
 DPI = 110
+Format = Literal["png", "pdf", "svg"]
+FORMATS: tuple[str, ...] = get_args(Format)
+
+
+def figure_style() -> AbstractContextManager[None]:
+    """Type and spines of all figures; letters in a PDF stay letters."""
+    look: dict[Any, Any] = {"font.size": 9, "pdf.fonttype": 42, "svg.fonttype": "none"}
+    return mpl.rc_context({**look, "axes.spines.top": False, "axes.spines.right": False})
 
 
 def feet_shown(record: Record) -> list[tuple[str, str]]:
@@ -121,6 +131,10 @@ class Look(Checked):
         first, after = np.searchsorted(record.time, (begin, stop + 1e-9)).tolist()
         first = min(first, max(after - 2, 0))
         return slice(first, after, 1 + (after - first) // _MOST_POINTS)
+
+
+Draw = Callable[[Any, Look], Figure]
+"""Figure of a run, of which it shows a part."""
 
 
 def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:

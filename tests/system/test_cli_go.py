@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from template_control.cli.main import main
-from template_control.cli.report import print_route_table, summarise_route
+from template_control.cli.report import add_template, print_table
 from template_control.run.record import Record
+from template_control.run.summary import summarise
 from template_control.slip.scenario.run import ScenarioRecord
 
 KEYS = {
@@ -85,8 +86,14 @@ def test_the_robot_does_what_its_template_does(record, template):
     assert names == ["VLO", "VLO", "APEX", "APEX", "APEX", "VLO", "VLO"]
 
 
+def summarised(record, template):
+    figures = summarise(record, None)
+    add_template(figures, record, template)
+    return figures
+
+
 def test_what_is_told_is_in_the_records(record, template):
-    figures = summarise_route(record, template, None)
+    figures = summarised(record, template)
     assert figures["record"] is None
     assert figures["top_speed"] == record.section_state[:, 0].max()
     wanted = np.array([1.1, 1.3, 1.3, 1.3, 1.1, 1.1])
@@ -97,12 +104,12 @@ def test_what_is_told_is_in_the_records(record, template):
 
 
 def test_where_the_nearest_speed_was_taken_is_told(record, template, capfd):
-    assert summarise_route(record, template, None)["nearest_speed_taken"]["strides"] == 0
+    assert summarised(record, template)["nearest_speed_taken"]["strides"] == 0
     target = record.section_target.copy()
     target[3, 0] = record.section_predicted[3, 0] + 0.5  # further than a running stride leads
-    figures = summarise_route(replace(record, section_target=target), template, None)
+    figures = summarised(replace(record, section_target=target), template)
     assert figures["nearest_speed_taken"] == {"strides": 1, "most": pytest.approx(0.5)}
-    print_route_table(figures)
+    print_table(figures)
     assert "1 times, 0.50 m/s off" in capfd.readouterr().out
 
 
@@ -110,7 +117,7 @@ def test_the_table_has_both_beside_each_other(scenario, tmp_path, capfd):
     words = ["go", str(scenario), "--steps", "1", "--no-figures", "--output", str(tmp_path)]
     assert main(words) == 0, "it did as many strides as it was to"
     out = capfd.readouterr().out
-    for text in ("robot", "template", "top speed", "strides, run to walk", "rad/s", "QP failures"):
+    for text in ("completed, robot / template", "top speed", "steps  ", "rad/s", "QP failures"):
         assert text in out
 
 
