@@ -382,7 +382,7 @@ def run_campaign(
         None if folder is None else folder / f"trials-{stem}.jsonl",
         executor,
         conditions.seed,
-        SweepOptions(progress, label="trials", retry_failed=True, grows=True),
+        SweepOptions(progress, label="trials", retry_failed=True),
     )
     for i, reason in done.failures.items():
         raise SweepError(f"trial {i} came to no end: {reason}")

@@ -1,23 +1,23 @@
 """Results of a sweep on disk: JSON lines, one appended as each item finishes.
 
-The first line identifies the sweep; each further line is a finished item. A process
-killed while it writes leaves at most a torn last line, which the next one drops.
+The first line names function and seed of the sweep; each further line is a finished item with its
+arguments. A process killed while it writes leaves at most a torn last line, which the next one
+drops.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, NoReturn
-
-import numpy as np
+from typing import Any, BinaryIO, NamedTuple, NoReturn, TypeVar
 
 from template_control.errors import SweepError
 from template_control.storage import free_lock, take_lock, to_jsonable
+
+T = TypeVar("T")
 
 _FORMAT = "template-control sweep 1"
 
@@ -47,42 +47,38 @@ def name_of(function: Callable[..., Any]) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
 
 
-def header(
-    function: Callable[..., Any], seed: int, items: Iterable[Any], whole: bool = True
-) -> dict[str, Any]:
-    """Identity of a sweep: format, function, seed, number and SHA-256 of its plain items.
-
-    The function counts by its name, not its code; number and SHA-256 only if ``whole``, as all
-    items are in the lines too. A SweepError if items or a partial's arguments are no plain data.
-    """
-    digest, count, what = hashlib.sha256(), 0, "the function"
+def _written(what: str, make: Callable[[], T]) -> T:
+    """What ``make`` returns; a SweepError if that, which is ``what``, is no plain data."""
     try:
-        name = name_of(function)
-        for item in items:
-            what = f"item {count}"
-            digest.update(json.dumps(to_jsonable(item), sort_keys=True).encode() + b"\n")
-            count += 1
+        return make()
     except TypeError as error:
         raise SweepError(f"{what} cannot be written to a file: {error}") from None
-    head = {"format": _FORMAT, "function": name, "seed": seed}
-    return {**head, "items": count, "sha256": digest.hexdigest()} if whole else head
 
 
 class SweepFile:
     """A results file, open and locked for this process; a context manager.
 
-    A new file is begun where there is none. ``head`` is :func:`header`'s; ``items`` are those of a
-    sweep that may have fewer or more of them in the file, None where the header identifies them.
-    ``finished`` are outcomes by item index, as the file had them; the last of an item counts. A
-    SweepError if the file holds anything but this sweep, another process is writing it or it cannot
-    be written.
+    A new file is begun where there is none; the file may have fewer or more items than ``items``,
+    the calls' arguments. The ``function`` counts by its name, not its code. ``finished`` are
+    outcomes by item index, as the file had them; the last of an item counts. A SweepError if the
+    file holds anything but this sweep, another process is writing it, it cannot be written, or
+    items or a partial's arguments are no plain data.
     """
 
     def __init__(
-        self, path: str | Path, head: dict[str, Any], items: Sequence[Any] | None = None
+        self,
+        path: str | Path,
+        function: Callable[..., Any],
+        items: Sequence[Mapping[str, Any]],
+        seed: int,
     ) -> None:
         self.path = Path(path)
-        self._items = items
+        name = _written("the function", lambda: name_of(function))
+        self._head = {"format": _FORMAT, "function": name, "seed": seed}
+        self._items = [
+            _written(f"item {i}", lambda item=item: to_jsonable(item))  # type: ignore[misc]
+            for i, item in enumerate(items)
+        ]
         self.finished: dict[int, Outcome] = {}
         if self.path.exists() and not self.path.is_file():
             self._refuse("is no file")
@@ -93,7 +89,7 @@ class SweepFile:
         try:
             if not take_lock(self._file.fileno()):
                 self._refuse("is being written by another sweep", "wait for that")
-            self._read(head)
+            self._read()
         except BaseException:
             self._close()
             raise
@@ -107,9 +103,9 @@ class SweepFile:
         with suppress(OSError):
             self._file.close()
 
-    def _read(self, head: dict[str, Any]) -> None:
+    def _read(self) -> None:
         """Read existing outcomes, truncate a torn last line, write the header of an empty file."""
-        first = json.dumps(head).encode() + b"\n"
+        first = json.dumps(self._head).encode() + b"\n"
         self._file.seek(0)
         end = 0
         for number, line in enumerate(self._file):
@@ -118,16 +114,16 @@ class SweepFile:
                     self._refuse("holds no sweep")
                 break
             if number == 0:
-                self._compare(line, head)
+                self._compare(line)
             else:
-                self._take(number, line, head.get("items"))
+                self._take(number, line)
             end += len(line)
         self._file.seek(end)
         self._file.truncate()
         if end == 0:
             self._write(first)
 
-    def _compare(self, line: bytes, head: dict[str, Any]) -> None:
+    def _compare(self, line: bytes) -> None:
         try:
             found = json.loads(line)
             known = found["format"] == _FORMAT
@@ -135,39 +131,36 @@ class SweepFile:
             known = False
         if not known:
             self._refuse("holds no sweep")
-        for key, value in head.items():
+        for key, value in self._head.items():
             if found.get(key) != value:
-                what = "other items" if key == "sha256" else f"{key} {found.get(key)}, not {value}"
-                self._refuse(f"holds another sweep ({what})")
+                self._refuse(f"holds another sweep ({key} {found.get(key)}, not {value})")
 
-    def _take(self, number: int, line: bytes, count: int | None) -> None:
+    def _take(self, number: int, line: bytes) -> None:
         try:
             entry = json.loads(line)
             index, error = entry["index"], entry.get("error")
-            known = 0 <= index < (np.inf if count is None else count)
-            known = known and (isinstance(error, str) or "result" in entry)
+            known = index >= 0 and (isinstance(error, str) or "result" in entry)
         except (ValueError, KeyError, TypeError, AttributeError):
             known = False
         if not known:
             raise SweepError(
                 f"{self.path} line {number + 1} is no result: delete the line, its item runs again"
             )
-        if self._items is not None:
-            if index >= len(self._items):
-                return  # a longer sweep's
-            item, own = entry.get("item"), to_jsonable(self._items[index])
-            if json.dumps(item, sort_keys=True) != json.dumps(own, sort_keys=True):
-                self._refuse(f"holds another sweep (another item {index})")
+        if index >= len(self._items):
+            return  # a longer sweep's
+        item, own = (json.dumps(x, sort_keys=True) for x in (entry.get("item"), self._items[index]))
+        if item != own:
+            self._refuse(f"holds another sweep (another item {index})")
         self.finished[index] = Outcome(entry.get("result"), error)
 
-    def append(self, index: int, item: Mapping[str, Any], seed: int, outcome: Outcome) -> None:
+    def append(self, index: int, seed: int, outcome: Outcome) -> None:
         """Append a finished item; the line is flushed to the operating system before this returns.
 
-        ``index`` counts from 0; ``item`` are the call's keyword arguments, ``seed`` is that of
-        :func:`~.sweep.item_seed`, ``outcome`` plain data or an error.
+        ``index`` counts from 0; ``seed`` is that of :func:`~.sweep.item_seed`, ``outcome`` plain
+        data or an error.
         """
         end = {"result": outcome.result} if outcome.error is None else {"error": outcome.error}
-        entry = {"index": index, "item": to_jsonable(item), "seed": seed, **end}
+        entry = {"index": index, "item": self._items[index], "seed": seed, **end}
         self._write(json.dumps(entry).encode() + b"\n")
 
     def _write(self, line: bytes) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Iterable
-from concurrent.futures import FIRST_EXCEPTION, Executor, wait
+from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import lru_cache
@@ -50,14 +50,7 @@ def simulate_many(
         settings.to_table(experiment)  # refuses what only this process has
     ready(COMPILED)
     with workers() if executor is None else nullcontext(executor) as pool:
-        under_way = [pool.submit(run_experiment, experiment) for experiment in rows]
-        done, waiting = wait(under_way, return_when=FIRST_EXCEPTION)
-        for future in waiting:
-            future.cancel()
-    for future in under_way:
-        if future in done:
-            future.result()  # raises what ended the others
-    return [future.result() for future in under_way]
+        return list(pool.map(run_experiment, rows))
 
 
 def run_experiment(experiment: Experiment) -> Record:

@@ -26,7 +26,7 @@ from template_control.checks.fitting import check, shown
 from template_control.checks.ranges import Count, Index, Range
 from template_control.errors import SweepError
 from template_control.sweep.executor import ExecutorLostError, check_pickles, run_calls
-from template_control.sweep.file import Outcome, SweepFile, header
+from template_control.sweep.file import Outcome, SweepFile
 from template_control.terminal import bar, plain_console
 
 Item = dict[str, Any]
@@ -95,7 +95,6 @@ class SweepOptions(Checked):
         label: of the bar and of error messages.
         retry_failed: repeat the items that failed according to the file.
         in_flight: number of items submitted at a time; at least the number of workers.
-        grows: the file may be of a sweep of fewer or more items, where these begin alike.
 
     Raises:
         SweepError: if no item may be in flight.
@@ -107,7 +106,6 @@ class SweepOptions(Checked):
     label: str = "sweep"
     retry_failed: bool = False
     in_flight: Count = 1000
-    grows: bool = False
 
 
 def grid(**axes: Iterable[Any]) -> list[Item]:
@@ -172,10 +170,11 @@ def sweep(
 
     A function with a parameter ``seed`` gets :func:`item_seed`. It returns plain data (see
     :func:`~template_control.storage.to_jsonable`), and for worker processes it is defined at the
-    top level of a module. With a ``path`` every item is on disk as soon as it finishes, and the
-    same sweep run again goes on from there. The file knows the function by its name: give another
-    path after a change of its code. Ctrl-C keeps the results that are there, those of the next half
-    second too, and ends processes that the sweep has begun itself.
+    top level of a module. With a ``path`` every item is on disk as soon as it finishes, and the same
+    sweep run again, or one of more items that begins alike, goes on from there. The file knows the
+    function by its name: give another path after a change of its code. Ctrl-C keeps the results
+    that are there, those of the next half second too, and ends processes that the sweep has begun
+    itself.
 
     Args:
         function: what to call.
@@ -192,9 +191,7 @@ def sweep(
     takes_seed, rows = _checked(function, items, seed)
     check_pickles(function, executor)
     seeds = tuple(item_seed(seed, i) for i in range(len(rows)))
-    grown = rows if options.grows else None
-    head = header(function, seed, rows, whole=not options.grows)
-    book = nullcontext() if path is None else SweepFile(path, head, grown)
+    book = nullcontext() if path is None else SweepFile(path, function, rows, seed)
     with book as file, _bar(options.progress) as progress:
         ledger: dict[int, Outcome] = {} if file is None else file.finished
         if options.retry_failed:
@@ -207,7 +204,7 @@ def sweep(
         def keep(index: int, outcome: Outcome) -> None:
             nonlocal failed
             if file is not None:
-                file.append(index, rows[index], seeds[index], outcome)
+                file.append(index, seeds[index], outcome)
             ledger[index] = outcome
             failed += outcome.error is not None
             progress.update(task, completed=len(ledger), failed=failed)

@@ -117,7 +117,7 @@ def test_the_table_has_both_beside_each_other(scenario, tmp_path, capfd):
     words = ["go", str(scenario), "--steps", "1", "--no-figures", "--output", str(tmp_path)]
     assert main(words) == 0, "it did as many strides as it was to"
     out = capfd.readouterr().out
-    for text in ("completed, robot / template", "top speed", "steps  ", "rad/s", "QP failures"):
+    for text in ("completed, robot / template", "top speed", "falls", "rad/s", "QP failures"):
         assert text in out
 
 

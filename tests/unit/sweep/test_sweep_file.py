@@ -189,8 +189,7 @@ def test_a_dead_worker_process_ends_the_sweep_with_what_is_safe(tmp_path, log):
         ),
         ({"function": partial(square)}, r"another sweep \(function"),
         ({"seed": 1}, r"another sweep \(seed 0, not 1\)"),
-        ({"items": grid(x=range(4))}, r"another sweep \(items 3, not 4\)"),
-        ({"items": grid(x=[0, 1, 3])}, r"another sweep \(other items\)"),
+        ({"items": grid(x=[0, 1, 3])}, r"another sweep \(another item 2\)"),
     ],
 )
 def test_a_file_of_another_sweep_is_left_alone(tmp_path, change, culprit):
@@ -214,7 +213,7 @@ def test_a_file_that_is_no_sweep_is_left_alone(tmp_path, content):
     assert path.read_text() == content
 
 
-@pytest.mark.parametrize("line", ["junk", "3", '{"index": 9, "result": 0}', '{"index": 1}'])
+@pytest.mark.parametrize("line", ["junk", "3", '{"index": -1, "result": 0}', '{"index": 1}'])
 def test_a_line_that_is_no_result_is_named(tmp_path, line):
     path, items = tmp_path / "s.jsonl", grid(x=range(3))
     quietly(square, items, path)
