@@ -56,9 +56,9 @@ def trials(
     lot = np.random.default_rng(7)
     for sign in (1.0, -1.0):
         for x in lot.uniform(BEFORE, BEFORE + 1.0, options.places) * gait.step_length:
-            ground = tc.GroundStep(sign * HEIGHT * scale.length, float(x))
-            plant = tc.PlantOptions(ground_step=ground)
-            name = f"step of {1e3 * ground.height:+.1f} mm at {x:.2f} m"
+            height = sign * HEIGHT * scale.length
+            plant = tc.PlantOptions(terrain=tc.Terrain.step(height, float(x)))
+            name = f"step of {1e3 * height:+.1f} mm at {x:.2f} m"
             yield name, tc.Experiment(steps=steps, world=plant)
     for seed in range(options.grounds):
         terrain = tc.Terrain.random_steps(HEIGHT * scale.length, seed=seed)

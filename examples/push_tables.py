@@ -127,7 +127,7 @@ def trial(robot: str, way: str, disturbance: dict[str, float]) -> dict[str, Any]
     elif "height" in disturbance:
         before, beyond = footholds(model, run, step + 1)
         edge = before + disturbance["place"] * (beyond - before)
-        plant = tc.PlantOptions(ground_step=tc.GroundStep(disturbance["height"], edge))
+        plant = tc.PlantOptions(terrain=tc.Terrain.step(disturbance["height"], edge))
     else:
         push = (tc.Push(disturbance["impulse"], step, disturbance["phase"]),)
     record = tc.simulate(

@@ -24,7 +24,6 @@ from .errors import TemplateControlError as TemplateControlError
 from .plant.bullet import PlantOptions as PlantOptions
 from .plant.ideal import IdealOptions as IdealOptions
 from .plant.mujoco import MujocoOptions as MujocoOptions
-from .plant.terrain import GroundStep as GroundStep
 from .plant.terrain import Terrain as Terrain
 from .robot.five_link import FiveLink as FiveLink
 from .robot.five_link import Link as Link

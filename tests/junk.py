@@ -129,7 +129,6 @@ def targets(folder):
     calls = {kind: {} for kind in options}
     calls |= {
         tc.Push: {"impulse": 1.0},
-        tc.GroundStep: {"height": 0.01, "x": 1.0},
         tc.Link: {"length": 0.4, "mass": 3.0, "com": 0.2, "inertia": 0.1},
         tc.FiveLink: {
             "name": "mine", "trunk": LINK, "thigh": LINK, "shank": LINK, "torque_limit": (9.0, 9.0)

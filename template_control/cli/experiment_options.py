@@ -100,8 +100,6 @@ def _complete(base: Experiment, options: argparse.Namespace, given: dict[str, An
     """Set a flag's further keys, which depend on the rest of the experiment."""
     if not isinstance(base.world, PlantOptions):
         given.pop("world.friction", None)  # the ideal world has none
-    elif "world.terrain" in given:
-        given["world.ground_step"] = None  # which the terrain replaces
     if "world.robot" in given and isinstance(base.robot, RobotSpec):
         model = given["world.robot"].model  # what else it needs, it needs as the controller's
         given["world.robot"] = replace(base.robot, model=model, gravity=None, masses={})

@@ -172,10 +172,11 @@ def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
     if "attitude_rms" in figures:
         yield from floating_rows(figures)
     share = figures["flight_share"]
-    if share["template"]:
-        flight = figures["com_error_flight_rms"]
+    flight = figures["com_error_flight_rms"]
+    if flight is not None:
         errors = f"{1e3 * flight['x']:.2f} / {1e3 * flight['y']:.2f} mm"
         yield "CoM error in flight, RMS x / y", errors
+    if share["template"]:
         shares = f"{share['robot']:.3f} / {share['template']:.3f} of the time"
         yield "flight, robot / template", shares
     yield "duty factor", f"{figures['duty_factor']:.3f}"

@@ -7,7 +7,7 @@ from .mujoco import MujocoPlant as MujocoPlant
 from .plant import Plant as Plant
 from .plant import default_plant as default_plant
 from .plant import open_plant as open_plant
-from .terrain import GroundStep as GroundStep
 from .terrain import Terrain as Terrain
 from .terrain_spec import read_terrain as read_terrain
 from .terrain_spec import terrain_from as terrain_from
+from .world import WorldOptions as WorldOptions

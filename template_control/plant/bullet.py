@@ -6,25 +6,25 @@ import tempfile
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.checks.checked import Checked, checked
+from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_damping, check_mass_matrix
 from template_control.plant.c_library import decimal_points, silenced
-from template_control.plant.terrain import GroundStep, Terrain, pieces
+from template_control.plant.terrain import Terrain, pieces
 from template_control.plant.trunk import READ, read_trunk
+from template_control.plant.world import OptionsPlant, WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
 from template_control.robot.urdf import link_masses
 from template_control.warm_up import ready
@@ -50,52 +50,17 @@ def moment(place: Sequence[float], force: Sequence[float]) -> tuple[float, float
     return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
 
-@dataclass(frozen=True)
-class PlantOptions(Checked):
+@dataclass(frozen=True, kw_only=True)
+class PlantOptions(WorldOptions):
     """Options of the world in PyBullet.
 
     Attributes:
         friction: Coulomb coefficient between foot and ground.
-        time_step: physics step [s].
-        mass_scale: factor of every link's mass and inertia; the controller does not know it.
-        ground_step: a step of the ground, which the controller does not know; None for flat ground.
-        terrain: any other ground, which the controller does not know; None for flat ground, or that
-            with the ``ground_step``.
-        gravity: [m/s^2]; None: what the controller knows.
-        robot: that is simulated, with the joints and feet of the controller's, which does not know
-            it; None: the same.
-
-    Raises:
-        ParameterError: if a number is not positive and finite, or the ground is given twice.
     """
 
     kind: ClassVar[str] = "pybullet"
 
     friction: Positive = 0.7
-    time_step: Positive = 1e-3
-    mass_scale: Positive = 1.0
-    ground_step: GroundStep | None = None
-    terrain: Terrain | None = None
-    gravity: Positive | None = None
-    robot: RobotSpec | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.ground_step is not None and self.terrain is not None:
-            raise ParameterError(
-                f"{type(self).__name__} has a ground_step and a terrain: leave one out"
-            )
-
-    @cached_property
-    def ground(self) -> Terrain:
-        """The ground, given as a terrain or as a step."""
-        if self.ground_step is not None:
-            return self.ground_step.terrain
-        return self.terrain or Terrain.flat()
-
-    def ground_height(self, x: float) -> float:
-        """Height of the ground at ``x`` [m]."""
-        return self.ground.height_at(x)
 
 
 @cache
@@ -110,30 +75,6 @@ def pybullet() -> Any:
             " (which compiles it on Python 3.12 and later), or take another plant, such as mujoco"
         ) from None
     return module
-
-
-class OptionsPlant:
-    """A plant that ``options`` describe, and a context manager; see :class:`~.plant.Plant`."""
-
-    options: Any
-
-    @property
-    def time_step(self) -> float:
-        """See :class:`~.plant.Plant`."""
-        return float(self.options.time_step)
-
-    def ground_height(self, x: float) -> float:
-        """See :class:`~.plant.Plant`."""
-        return float(self.options.ground_height(x))
-
-    def close(self) -> None:
-        """See :class:`~.plant.Plant`; there is nothing to give back."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 class EnginePlant(OptionsPlant, ABC):

@@ -10,7 +10,6 @@ template here is due to the robot.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from math import cos, sin
 from typing import ClassVar
 
@@ -18,15 +17,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Positive
+from template_control.checks.checked import checked
 from template_control.errors import DivergedError
 from template_control.plant.agreement import check_damping, trunk_corners
-from template_control.plant.bullet import OptionsPlant
 from template_control.plant.rigid_contact import RollingFeet, pressing, solve
-from template_control.plant.terrain import Terrain
+from template_control.plant.world import OptionsPlant, WorldOptions
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.spec import RobotSpec
 from template_control.robot.terms import PLANAR_DOF
 
 Array = NDArray[np.float64]
@@ -40,38 +36,14 @@ _SWEEPS = 30  # over the joints with friction; four coupled joints need no more
 _DRIFT = 1e-12  # constraint error [m, m/s] that is projected away
 
 
-@dataclass(frozen=True)
-class IdealOptions(Checked):
+@dataclass(frozen=True, kw_only=True)
+class IdealOptions(WorldOptions):
     """Options of the ideal world. Friction is not modelled: stance feet stick.
 
-    Attributes:
-        time_step: period of the torques [s]; one step of the integrator.
-        mass_scale: factor of every link's mass and inertia; the controller does not know it.
-        terrain: the ground, which the controller does not know; None for flat ground.
-        gravity: [m/s^2]; None: what the controller knows.
-        robot: that is simulated, with the joints and feet of the controller's, which does not know
-            it; None: the same.
-
-    Raises:
-        ParameterError: if a number is not positive and finite.
+    The integrator makes one step in each ``time_step``.
     """
 
     kind: ClassVar[str] = "ideal"
-
-    time_step: Positive = 1e-3
-    mass_scale: Positive = 1.0
-    terrain: Terrain | None = None
-    gravity: Positive | None = None
-    robot: RobotSpec | None = None
-
-    @cached_property
-    def ground(self) -> Terrain:
-        """The ground."""
-        return self.terrain or Terrain.flat()
-
-    def ground_height(self, x: float) -> float:
-        """Height of the ground at ``x`` [m]."""
-        return self.ground.height_at(x)
 
 
 class IdealPlant(OptionsPlant):

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MujocoOptions(PlantOptions):
     """Options of the world in MuJoCo: as in PyBullet, and the compliance of its contacts.
 

@@ -14,6 +14,7 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
 from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
+from template_control.plant.world import WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 
@@ -75,7 +76,7 @@ class Plant(Protocol):
         """Give back what the plant holds."""
 
 
-World = PlantOptions | MujocoOptions | IdealOptions | Plant
+World = WorldOptions | Plant
 """A plant, or the options of one of the library's."""
 
 _MEMBERS = (
@@ -97,7 +98,7 @@ def default_plant() -> PlantOptions:
 
 def check_world(world: World) -> None:
     """Check that an object is options or a :class:`Plant` with a positive time step."""
-    if isinstance(world, PlantOptions | IdealOptions):
+    if isinstance(world, WorldOptions):
         return
     lacking = [name for name in _MEMBERS if not hasattr(world, name)]
     if lacking:
@@ -114,7 +115,7 @@ def check_world(world: World) -> None:
 
 def plant_name(world: World) -> str:
     """Name of a plant: ``ideal``, ``mujoco``, ``pybullet``; of another one, that of its class."""
-    if isinstance(world, PlantOptions | IdealOptions):
+    if isinstance(world, WorldOptions):
         return world.kind
     return type(world).__name__
 
@@ -122,7 +123,7 @@ def plant_name(world: World) -> str:
 R = TypeVar("R", bound=Biped)
 
 
-def robot_in(world: PlantOptions | IdealOptions, robot: R) -> R:
+def robot_in(world: WorldOptions, robot: R) -> R:
     """The robot that is simulated: the controller's, or the world's own, with the world's gravity.
 
     A ParameterError if the world's robot has other joints or feet, or another base.
@@ -169,7 +170,7 @@ def open_plant(robot: Biped, world: World) -> AbstractContextManager[Plant]:
     Raises:
         ParameterError: if the plant is for planar robots, and the robot has a floating base.
     """
-    if not isinstance(world, PlantOptions | IdealOptions):
+    if not isinstance(world, WorldOptions):
         return nullcontext(world)
     planar, floating = next(of for kind, of in _PLANTS.items() if isinstance(world, kind))
     made = floating if isinstance(robot, FloatingBaseBiped) else planar

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range, Rising
+from template_control.checks.ranges import Count, Index, NotNegative, Positive, Range, Rising, Share
 from template_control.errors import ParameterError
 from template_control.slip.gaits.gait import WalkingGait
 
@@ -22,7 +22,6 @@ _FARTHEST = 1000.0  # [m]
 _STEEPEST = float(np.radians(45.0))
 _LEVEL = 1e-9  # [m] the ground is at height 0 where a run begins
 _MOST_POINTS = 100_000
-_HIGHEST_STEP = 1.0  # [m]
 _END = 2000.0  # length of the level parts at both ends [m]
 _DEPTH = 1.0  # of the boxes below the lowest ground [m]
 _HALF_WIDTH = 1.0  # across the way [m]
@@ -52,8 +51,8 @@ class Terrain(Checked):
     """Ground that goes in straight lines from point to point.
 
     Before the first point and beyond the last one it is level. Two points at the same x are a
-    wall. The constructor takes the points; :meth:`flat`, :meth:`step`, :meth:`stairs`,
-    :meth:`slope`, :meth:`random_steps` and :meth:`of_function` make the usual ones.
+    wall. The constructor takes the points; :meth:`flat`, :meth:`step`, :meth:`at_step`,
+    :meth:`stairs`, :meth:`slope`, :meth:`random_steps` and :meth:`of_function` make the usual ones.
 
     Attributes:
         points: x and height of each, x never falling [m]. A run begins with the stance foot at
@@ -180,6 +179,20 @@ class Terrain(Checked):
 
     @classmethod
     @checked
+    def at_step(cls, gait: WalkingGait, height: Height, step: Count, share: Share = 0.5) -> Terrain:
+        """One step, on which the robot treads with its ``step``-th foothold.
+
+        Args:
+            gait: its footholds are at multiples of the step length, the first stance foot
+                (number 0) at x = 0.
+            height: up positive [m].
+            step: number of the first foothold beyond the wall, at least 1.
+            share: of the way from the foothold before to that one, where the wall is.
+        """
+        return cls.step(height, (step - 1 + share) * gait.step_length)
+
+    @classmethod
+    @checked
     def stairs(cls, rise: Height, run: Positive, count: Count, start: Start = 1.0) -> Terrain:
         """Steps of one size.
 
@@ -265,55 +278,6 @@ def _check_count(points: float) -> None:
             f"the ground has about {points:.3g} points: give fewer or longer pieces, of at most"
             f" {_MOST_POINTS} points"
         )
-
-
-@dataclass(frozen=True)
-class GroundStep(Checked):
-    """A single step of the ground: at height 0 before ``x``, at ``height`` from there on.
-
-    The edge is a vertical wall, on which a foot can trip; place it between footholds, as
-    :meth:`at_step` does.
-
-    Attributes:
-        height: up positive [m].
-        x: of the edge [m]; a run begins with the stance foot at x = 0.
-
-    Raises:
-        ParameterError: if the height is 0 or more than 1 m, or x is not within 0 to 1000 m.
-    """
-
-    height: Annotated[float, Range(-_HIGHEST_STEP, _HIGHEST_STEP)]
-    x: Start
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.height == 0.0:
-            raise ParameterError("GroundStep.height is 0: give a number other than 0")
-
-    @classmethod
-    def at_step(cls, gait: WalkingGait, height: float, step: int, share: float = 0.5) -> GroundStep:
-        """The step that the robot meets when it treads on its ``step``-th foothold.
-
-        Args:
-            gait: its footholds are at multiples of the step length, the first stance foot
-                (number 0) at x = 0.
-            height: up positive [m].
-            step: number of the first foothold beyond the edge, at least 1.
-            share: of the way from the foothold before to that one, where the edge is.
-
-        Raises:
-            ParameterError: if a number is out of its range.
-        """
-        if step < 1:
-            raise ParameterError(f"foothold is {step}: give at least 1")
-        if not 0.0 < share < 1.0:
-            raise ParameterError(f"share is {share!r}: give a number between 0 and 1")
-        return cls(height, (step - 1 + share) * gait.step_length)
-
-    @property
-    def terrain(self) -> Terrain:
-        """The ground with this step in it."""
-        return Terrain.step(self.height, self.x)
 
 
 class Piece(NamedTuple):

@@ -17,8 +17,12 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative
 from template_control.errors import ParameterError, SweepError
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.terrain import GroundStep
-from template_control.robustness.disturbances import PUSH_SECONDS, engine, impulse_unit
+from template_control.robustness.disturbances import (
+    PUSH_SECONDS,
+    engine,
+    impulse_unit,
+    with_step,
+)
 from template_control.robustness.fall_cause import fall_cause
 from template_control.robustness.findings import wilson_interval
 from template_control.robustness.fingerprint import fingerprint
@@ -240,11 +244,14 @@ class CampaignConfig(Checked):
         seconds, direction = PUSH_SECONDS * scale.time, radians(draw.direction)
         disturbed: dict[str, Any] = {
             "steps": self.mix.steps,
-            "world": replace(
-                world,
-                friction=draw.friction,
-                mass_scale=world.mass_scale * (1.0 + draw.mass),
-                ground_step=_ground_step(draw, scale.length, gait.step_length),
+            "world": with_step(
+                replace(
+                    world,
+                    friction=draw.friction,
+                    mass_scale=world.mass_scale * (1.0 + draw.mass),
+                ),
+                draw.ground_step * scale.length,
+                draw.ground_step_at * gait.step_length,
             ),
             "start": (z[0] * (1.0 + draw.speed), z[1] + draw.height * scale.length, z[2]),
             "pushes": (Push(impulse, int(step), phase, seconds, direction),),
@@ -257,11 +264,6 @@ class CampaignConfig(Checked):
 
 
 _SEED_BITS = 63  # that TOML can say
-
-
-def _ground_step(draw: DisturbanceSample, length: float, step_length: float) -> GroundStep | None:
-    height = draw.ground_step * length
-    return GroundStep(height, draw.ground_step_at * step_length) if height != 0.0 else None
 
 
 class Trial(NamedTuple):

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.plant import plant_name
-from template_control.plant.terrain import GroundStep
+from template_control.plant.terrain import Terrain
 from template_control.run.experiment import Experiment, PreparedExperiment, perturbed_start
 from template_control.run.options import Push
 from template_control.run.sensing import SensorOptions
@@ -39,6 +39,18 @@ def engine(experiment: Experiment) -> PlantOptions:
             " PlantOptions or MujocoOptions"
         )
     return experiment.world
+
+
+def with_step(world: PlantOptions, height: float, x: float) -> PlantOptions:
+    """The world with a step of its ground [m], none where the height is 0.
+
+    A ParameterError if it has a ground of its own.
+    """
+    if height == 0.0:
+        return world
+    if world.terrain is not None:
+        raise ParameterError("the world has a terrain, and is to get a step too: leave one out")
+    return replace(world, terrain=Terrain.step(height, x))
 
 
 def footholds(
@@ -184,7 +196,7 @@ def _step(name: str, title: str, sign: float) -> Disturbance:
         start = perturbed_start(where.gait, trial)
         before, beyond = footholds(where, start, _SOON + 1)[-2:]
         edge = float(before + _EDGES[trial] * (beyond - before))
-        world = replace(engine(where), ground_step=GroundStep(sign * level, edge))
+        world = with_step(engine(where), sign * level, edge)
         return replace(where, steps=_SOON + 1 + AFTER, world=world, start=start)
 
     def size(parameters: SlipParameters) -> float:

@@ -8,9 +8,8 @@ from typing import Any
 
 from template_control.checks.fitting import shown
 from template_control.embedding.controller import EmbeddingController
-from template_control.plant.bullet import PlantOptions
-from template_control.plant.ideal import IdealOptions
 from template_control.plant.plant import plant_name
+from template_control.plant.world import WorldOptions
 from template_control.run.experiment import Experiment
 from template_control.run.statistics import Statistics
 from template_control.slip.gaits.gait import flight_share
@@ -51,7 +50,7 @@ def conditions(o: Experiment) -> dict[str, Any]:
         for f in fields(o)
         if f.name not in _APART
     }
-    if not isinstance(o.world, PlantOptions | IdealOptions):
+    if not isinstance(o.world, WorldOptions):
         options["plant"] = {}
     return {"plant": plant_name(o.world), "options": options}
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from template_control import settings, storage
 from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
-from template_control.plant.terrain import GroundStep, Terrain
+from template_control.plant.terrain import Terrain
 from template_control.robot.biped import leg_means
 from template_control.run.facts import Facts
 from template_control.run.tables import Quantity, quantities, to_dataframe, to_xarray
@@ -184,10 +184,7 @@ class Record(Facts):
     @property
     def ground(self) -> Terrain:
         """The ground the robot went on; level where the plant was one of the user's own."""
-        plant = self.options["plant"]
-        if plant.get("ground_step"):
-            return GroundStep(**plant["ground_step"]).terrain
-        return settings.from_table(Terrain, plant.get("terrain") or {})
+        return settings.from_table(Terrain, self.options["plant"].get("terrain") or {})
 
     def __repr__(self) -> str:
         end = f"; fell: {self.fall_reason}" if self.fell else ""

@@ -170,7 +170,7 @@ def sweep(
 
     A function with a parameter ``seed`` gets :func:`item_seed`. It returns plain data (see
     :func:`~template_control.storage.to_jsonable`), and for worker processes it is defined at the
-    top level of a module. With a ``path`` every item is on disk as soon as it finishes, and the same
+    top level of a module. With a ``path`` every item is on disk as soon as it finishes. The same
     sweep run again, or one of more items that begins alike, goes on from there. The file knows the
     function by its name: give another path after a change of its code. Ctrl-C keeps the results
     that are there, those of the next half second too, and ends processes that the sweep has begun

@@ -10,7 +10,7 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import BulletPlant, PlantOptions, pybullet
-from template_control.plant.terrain import GroundStep
+from template_control.plant.terrain import Terrain
 from template_control.robot.library import load_robot
 from template_control.robot.start import state_at_vlo
 from template_control.run.experiment import Experiment
@@ -33,8 +33,8 @@ def on_step(gait):
 
     @cache
     def walked(height):
-        step = GroundStep.at_step(gait, height, 5)
-        options = PlantOptions(ground_step=step)
+        step = Terrain.at_step(gait, height, 5)
+        options = PlantOptions(terrain=step)
         return step, walk(load_robot("five-link"), gait, steps=9, world=options)
 
     return walked
@@ -43,7 +43,7 @@ def on_step(gait):
 @pytest.mark.parametrize("height", [0.04, -0.07])
 @pytest.mark.parametrize("edge", [2.0, 900.0])
 def test_rays_meet_the_ground_where_it_is_said_to_be(robot, height, edge):
-    options = PlantOptions(ground_step=GroundStep(height, edge))
+    options = PlantOptions(terrain=Terrain.step(height, edge))
     with BulletPlant(robot, options) as plant:
         for x in (-20.0, edge - 1e-3, edge + 1e-3, edge + 500.0):
             ((_, _, _, hit, _),) = pybullet().rayTest(
@@ -60,7 +60,7 @@ def test_a_step_nobody_told_of_moves_the_feet(on_step, robot, height):
     assert not record.fell
     at = np.searchsorted(record.time, record.section_time)[1:]
     foot = record.foot[at, record.rear[at]]
-    beyond = foot[:, 0] > step.x
+    beyond = foot[:, 0] > step.points[0][0]
     # The first foot beyond the edge is about the fifth.
     assert 3 <= np.argmax(beyond) <= 5
     np.testing.assert_allclose(foot[:, 1], np.where(beyond, height, 0.0), atol=1e-4)
@@ -83,7 +83,7 @@ def test_momentum_changes_by_the_forces_on_both_levels(on_step, robot):
 @pytest.mark.slow(seconds=2)
 def test_an_edge_out_of_reach_changes_nothing(robot, default_gait, short_walk):
     def towards(height):
-        plant = PlantOptions(ground_step=GroundStep(height, 50.0))
+        plant = PlantOptions(terrain=Terrain.step(height, 50.0))
         return walk(robot, default_gait, steps=short_walk.steps, world=plant)
 
     np.testing.assert_array_equal(towards(0.05).q, short_walk.q)
@@ -97,7 +97,7 @@ def test_a_wall_pushes_sideways(robot):
     q[1] -= 5e-4  # the stance foot touches the ground
     edge = 0.2 + robot.foot_radius - 1e-3
     forces = np.zeros((2, 2))
-    with BulletPlant(robot, PlantOptions(ground_step=GroundStep(0.25, edge))) as plant:
+    with BulletPlant(robot, PlantOptions(terrain=Terrain.step(0.25, edge))) as plant:
         plant.reset(q, v)
         plant.step(np.zeros(robot.nv - 3))
         plant.contact_forces(forces)
@@ -119,7 +119,7 @@ def test_the_stick_diagram_draws_the_step(on_step, short_walk, tmp_path):
     (axes,) = stick_diagram(record, Look(start=-4.0)).axes
     ground = axes.lines[-1].get_xydata()
     np.testing.assert_allclose(ground[:, 1], [0.0, 0.0, 0.005, 0.005])
-    np.testing.assert_allclose(ground[1:3, 0], step.x)
+    np.testing.assert_allclose(ground[1:3, 0], step.points[0][0])
     (axes,) = stick_diagram(short_walk).axes
     assert np.all(axes.lines[-1].get_ydata() == 0.0)
 
@@ -232,11 +232,10 @@ def test_torques_act_that_many_ticks_later(robot, gait, monkeypatch, ticks):
 @pytest.mark.parametrize(
     ("make", "culprit"),
     [
-        (lambda: GroundStep(0.0, 1.0), "height.*other than 0"),
-        (lambda: GroundStep(np.nan, 1.0), "height"),
-        (lambda: GroundStep(1.5, 1.0), "height"),
-        (lambda: GroundStep(0.1, 0.0), "GroundStep.x.*above 0"),
-        (lambda: GroundStep(0.1, 2e3), "GroundStep.x"),
+        (lambda: Terrain.step(np.nan, 1.0), "height"),
+        (lambda: Terrain.step(1e4, 1.0), "height"),
+        (lambda: Terrain.step(0.1, 0.0), "x is .*above 0"),
+        (lambda: Terrain.step(0.1, 2e3), "x is "),
         (lambda: SensorOptions(position_noise=-1.0), "position_noise"),
         (lambda: SensorOptions(velocity_noise=np.inf), "velocity_noise"),
         (lambda: SensorOptions(seed=-1), "seed"),
@@ -253,8 +252,8 @@ def test_bad_disturbances_are_named(make, culprit):
 
 
 def test_bad_footholds_are_named(gait):
-    with pytest.raises(ParameterError, match="foothold"):
-        GroundStep.at_step(gait, 0.1, 0)
+    with pytest.raises(ParameterError, match="step is 0"):
+        Terrain.at_step(gait, 0.1, 0)
     with pytest.raises(ParameterError, match="share"):
-        GroundStep.at_step(gait, 0.1, 3, share=1.0)
-    assert GroundStep.at_step(gait, 0.1, 3).x == pytest.approx(2.5 * gait.step_length)
+        Terrain.at_step(gait, 0.1, 3, share=1.1)
+    assert Terrain.at_step(gait, 0.1, 3).points[0][0] == pytest.approx(2.5 * gait.step_length)

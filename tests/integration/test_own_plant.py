@@ -67,7 +67,7 @@ def test_the_librarys_plants_are_plants(robot):
             assert isinstance(plant, Plant)
             assert plant.time_step == 1e-3
             assert plant.ground_height(0.3) == 0.0
-    step = tc.PlantOptions(ground_step=tc.GroundStep(0.02, 1.0))
+    step = tc.PlantOptions(terrain=tc.Terrain.step(0.02, 1.0))
     with BulletPlant(robot, step) as bullet:
         assert bullet.ground_height(1.5) == 0.02
 

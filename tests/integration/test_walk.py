@@ -8,7 +8,7 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
-from template_control.plant.terrain import GroundStep
+from template_control.plant.terrain import Terrain
 from template_control.robot.library import load_robot
 from template_control.robustness.disturbances import footholds as find_footholds
 from template_control.robustness.severity_sweep import gait_errors
@@ -232,7 +232,7 @@ def footholds(default_gait):
 @pytest.mark.parametrize(("height", "share"), [(-0.03, 0.3), (0.03, 0.7)])
 def test_a_step_of_the_ground_that_it_does_not_see(default_gait, footholds, height, share):
     before, beyond = footholds
-    edge = GroundStep(height, before + share * (beyond - before))
-    record = walk(default_gait, steps=13, world=PlantOptions(ground_step=edge))
+    edge = Terrain.step(height, before + share * (beyond - before))
+    record = walk(default_gait, steps=13, world=PlantOptions(terrain=edge))
     assert not record.fell
     assert max(map(abs, gait_errors(record, default_gait))) < 0.02, "back within 10 steps"

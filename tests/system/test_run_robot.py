@@ -220,8 +220,8 @@ def test_robot_runs_with_another_mass_than_its_model_has(mass_scale):
 def test_robot_runs_on_over_a_step_that_it_does_not_see(robot, gait, height):
     where = tc.Experiment(robot, planner=tc.RunningPlanner(gait)).prepare()
     before, beyond = footholds(where, (*gait.apex, 0.0), 5)[-2:]
-    step = tc.GroundStep(height, 0.5 * (before + beyond))
-    record = run(3.0, 17, world=tc.PlantOptions(ground_step=step))
+    step = tc.Terrain.step(height, 0.5 * (before + beyond))
+    record = run(3.0, 17, world=tc.PlantOptions(terrain=step))
     assert record.fall_reason == ""
     assert record.foot[-1, :, 1].min() > height - 0.01
     assert np.max(np.abs(record.section_state[14:, 0] / 3.0 - 1.0)) < 0.02

@@ -126,7 +126,7 @@ ROUND_TRIPS = {
         sensors=tc.SensorOptions(1e-3, 2e-2, 5, 0.02),
         delay=0.003,
     ),
-    "ground": tc.Experiment(world=tc.PlantOptions(ground_step=tc.GroundStep(0.01, 2.0))),
+    "ground": tc.Experiment(world=tc.PlantOptions(terrain=tc.Terrain.step(0.01, 2.0))),
     "lqr": tc.LqrOptions(offset_gain=0.1),
     "scenario": tc.example_one(),
 }

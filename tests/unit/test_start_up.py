@@ -26,7 +26,7 @@ ROOMS = (
 # What the root exported when it exported everything.
 ONCE_IN_THE_ROOT = (
     "AUTOMATON", "ROBOTS", "STRIDE_START", "ActiveRunning", "ActiveWalking", "Decision",
-    "EmbeddingController", "EmbeddingOptions", "Event", "FiveLink", "GaitError", "GroundStep",
+    "EmbeddingController", "EmbeddingOptions", "Event", "FiveLink", "GaitError",
     "IdealOptions", "Link", "LqrOptions", "LqrPlanner", "MapKind", "ModifiedOptions",
     "ModifiedPlanner", "ModifiedWalking", "Outcome", "ParameterError", "PlanarBiped", "Planner",
     "PlantOptions", "Push", "Record", "RecordError", "ReturnMap", "RobotError", "RunToWalk",

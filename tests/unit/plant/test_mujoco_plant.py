@@ -123,8 +123,8 @@ def test_the_ground_carries_the_robot(walk, robot):
 @pytest.mark.slow(seconds=2)
 @pytest.mark.parametrize("height", [0.02, -0.02])
 def test_a_step_of_the_ground_is_where_it_is_told(robot, default_gait, height):
-    step = tc.GroundStep.at_step(default_gait, height, 2)
-    world = tc.MujocoOptions(ground_step=step)
+    step = tc.Terrain.at_step(default_gait, height, 2)
+    world = tc.MujocoOptions(terrain=step)
     record = tc.simulate(
         tc.Experiment(robot, planner=tc.LqrPlanner(default_gait), steps=5, world=world)
     )

@@ -3,6 +3,7 @@
 import dataclasses
 import json
 import tomllib
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -22,6 +23,7 @@ from template_control.plant import (
 )
 from template_control.plant.bullet import pybullet
 from template_control.plant.terrain import pieces
+from template_control.robustness.disturbances import with_step
 
 SLOPE = Terrain.slope(np.radians(4.0))
 GROUNDS = {
@@ -233,11 +235,12 @@ def test_every_plant_tells_the_ground_below(robot, kind):
     assert options[kind]().ground_height(1.7) == 0.0
 
 
-def test_a_ground_step_is_one_kind_of_terrain(robot):
-    step = tc.PlantOptions(ground_step=tc.GroundStep(0.02, 1.5))
-    assert step.ground == Terrain.step(0.02, 1.5)
-    with pytest.raises(ParameterError, match="ground_step and a terrain: leave one out"):
-        tc.PlantOptions(ground_step=tc.GroundStep(0.02, 1.5), terrain=SLOPE)
+def test_a_step_goes_into_level_ground_only():
+    world = tc.PlantOptions(friction=0.5)
+    assert with_step(world, 0.02, 1.5) == replace(world, terrain=Terrain.step(0.02, 1.5))
+    assert with_step(replace(world, terrain=SLOPE), 0.0, 1.5).terrain == SLOPE
+    with pytest.raises(ParameterError, match="has a terrain, and is to get a step too"):
+        with_step(replace(world, terrain=SLOPE), 0.02, 1.5)
 
 
 def test_text_tells_every_kind(tmp_path):

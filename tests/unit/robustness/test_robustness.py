@@ -97,9 +97,9 @@ def test_options_hold_the_level(robot, gait, monkeypatch):
     assert (push.impulse, push.step, push.phase, push.duration) == (15.0, BEGIN, 0.2, 0.1)
     assert of("push-backward", 15.0).pushes[0].impulse == -15.0
     assert of("push-backward", 15.0).steps == BEGIN + 1 + AFTER
-    assert of("step-up", 0.03).world.ground_step.height == 0.03
-    assert of("step-down", 0.03).world.ground_step.height == -0.03
-    edges = [of("step-up", 0.03, number).world.ground_step.x for number in (0, 4)]
+    assert of("step-up", 0.03).world.terrain.points[1][1] == 0.03
+    assert of("step-down", 0.03).world.terrain.points[1][1] == -0.03
+    edges = [of("step-up", 0.03, number).world.terrain.points[0][0] for number in (0, 4)]
     assert edges == pytest.approx([4.3 * gait.step_length, 4.7 * gait.step_length])
     assert of("friction", 0.4).world.friction == 0.4
     assert of("heavier", 0.2).world.mass_scale == pytest.approx(1.2)
@@ -118,7 +118,7 @@ def test_options_hold_the_level(robot, gait, monkeypatch):
 def test_the_edge_of_a_step_lies_between_two_footholds(robot, gait, number):
     where = Experiment(robot, planner=LqrPlanner(gait)).prepare()
     stepped = BY_NAME["step-up"].experiment(where, 0.001, number)
-    edge = stepped.world.ground_step.x
+    edge = stepped.world.terrain.points[0][0]
     record = simulate(replace(stepped, steps=8))
     at = np.searchsorted(record.time, record.section_time)
     foothold = record.foot[at, record.rear[at]]
