@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from template_control.checks import option_types as values
@@ -17,13 +15,12 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset
 from template_control.storage import Files
-from template_control.terminal import table
+from template_control.terminal import show, table
 from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits, words
 from template_control.view.style import save_figure
 
 _SUFFIXES = (".png", ".svg", ".pdf")
 _COLUMNS = ("node", "phase", "rear leg", "front leg", "guard -> successor (reset)", "fails")
-_PIPE_WIDTH = 140  # columns where there is no terminal to ask
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -54,17 +51,9 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps(describe(AUTOMATON)))
     else:
-        _print(figure)
+        show(*tables(AUTOMATON), lines=() if figure is None else (f"figure: {figure}",))
     files.raise_pending()
     return 0
-
-
-def _print(figure: Path | None) -> None:
-    console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH, highlight=False)
-    for shown in tables(AUTOMATON):
-        console.print(shown)
-    if figure is not None:
-        console.print(f"figure: {figure}", markup=False, soft_wrap=True)
 
 
 def save(automaton: Automaton, path: Path) -> Path:

@@ -1,20 +1,14 @@
-"""Figure of the hybrid automaton (Fig. 2)."""
+"""Figure of the hybrid automaton (Fig. 2): a panel a gait."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
 import numpy as np
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
-from matplotlib.path import Path
-from matplotlib.text import Text
-from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 
 from template_control.slip.automaton.hybrid import Automaton, Edge
@@ -22,10 +16,35 @@ from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Re
 
 Array = NDArray[np.float64]
 
-PAD = 1.2
-"""Space about the centres of a gait's nodes, in drawing units."""
+GAIT_NAMES: dict[str, str] = {
+    StrideKind.WALK: "walking",
+    StrideKind.RUN: "running",
+    StrideKind.WALK_TO_RUN: "walk-to-run",
+    StrideKind.RUN_TO_WALK: "run-to-walk",
+    StrideKind.WALK_TO_RUN_SIMPLIFIED: "walk-to-run, simplified",
+    StrideKind.STAND: "standing",
+    StrideKind.STAND_TO_WALK: "start",
+    StrideKind.WALK_TO_STAND: "stop",
+    StrideKind.CHANGE_SPEED: "to another speed",
+    StrideKind.WALK_PUSH_OFF: "walking with push-off",
+    StrideKind.STEP_FORWARD: "step from a stand",
+    StrideKind.STEP_BACK: "step back from a stand",
+    StrideKind.HOP: "hopping",
+}
+"""Gaits by the superscripts of Table I, and of standing."""
 
-_PITCH, _ROW = 2.85, 3.5  # of nodes, and of rows
+_PHASES = {
+    Phase.F: ("#eef2f6", "flight"),
+    Phase.SS: ("#cfe1f2", "single stance"),
+    Phase.DS: ("#f7dcc0", "double stance"),
+}
+_INK, _SECTION, _CHOICE, _PANEL = "#3a3f45", "#b3202a", "#6b7078", "#f9f9f7"
+# Lengths in drawing units; _INCH inches each.
+_INCH, _WIDTH, _GAP = 0.5, 32.0, 0.4
+_NODE, _PITCH, _LEAST = 0.66, 3.2, 1.7  # of nodes; from one to the next; least radius of a circle
+_AROUND, _TITLE = 2.6, 0.3  # of a panel, about the circle and above that
+_BEND, _BEYOND, _STUB = 0.22, 0.8, 0.9  # of arrows; labels beyond them; arrows that leave a gait
+_FONT = 10.0
 
 
 def successions(automaton: Automaton) -> Iterator[tuple[str, str, Edge]]:
@@ -69,84 +88,6 @@ def choices(automaton: Automaton) -> list[tuple[str, str]]:
     ]
 
 
-def layout(automaton: Automaton) -> dict[str, Array]:
-    """Centre of every node, shape (2,), drawing units.
-
-    A gait that returns to itself is a circle, at the left and the right in turn, its start
-    facing the middle. The others are rows between: above if they lead to the right, else
-    below, from the side they start on; below too if they begin or end at a lower circle.
-    """
-    members = gaits(automaton)
-    ends = [
-        (automaton.node(a).gait, automaton.node(b).gait)
-        for a, b, edge in successions(automaton)
-        if edge.section
-    ]
-    cycles = [gait for gait in members if (gait, gait) in ends]
-    rows = [gait for gait in members if gait not in cycles]
-    half = 0.5 * _PITCH * (max((len(members[g]) for g in rows), default=1) - 1)
-    centre: dict[str, Array] = {}
-    depth = [0.0, 0.0]
-    for i, gait in enumerate(cycles):
-        count = len(members[gait])
-        radius = max(2.0, _PITCH * count / (2 * np.pi))
-        side = -1 if i % 2 == 0 else 1
-        middle = np.array([side * (half + 2 * PAD + 0.9 + radius), depth[i % 2]])
-        depth[i % 2] -= 2 * (radius + PAD) + 1.0
-        for j, name in enumerate(members[gait]):
-            angle = 2 * np.pi * j / count + (0.0 if side < 0 else np.pi)
-            centre[name] = middle + radius * np.array([np.cos(angle), np.sin(angle)])
-    came_from = {b: a for a, b in choices(automaton)}
-    level = {1: 0, -1: 0}
-    for gait in rows:
-        names = members[gait]
-        source = centre.get(came_from.get(names[0], ""))
-        way = 1 if source is None or source[0] < 0 else -1
-        last = automaton.node(names[-1])
-        goal = next((centre[str(e.target)] for e in last.edges if e.target in centre), None)
-        across = goal is None or goal[0] * way > 0.0
-        through = len(names) > 1 and any(e.section for e in last.edges) and across
-        pitch = 2 * half / (len(names) - 1) if through else _PITCH
-        low = any(end is not None and end[1] < -_ROW for end in (source, goal))
-        side = -1 if low else way
-        height = side * _ROW * (0.5 + level[side])
-        level[side] += 1
-        for j, name in enumerate(names):
-            centre[name] = np.array([way * (j * pitch - half), height])
-    return centre
-
-
-GAIT_NAMES: dict[str, str] = {
-    StrideKind.WALK: "walking",
-    StrideKind.RUN: "running",
-    StrideKind.WALK_TO_RUN: "walk-to-run",
-    StrideKind.RUN_TO_WALK: "run-to-walk",
-    StrideKind.WALK_TO_RUN_SIMPLIFIED: "walk-to-run, simplified",
-    StrideKind.STAND: "standing",
-    StrideKind.STAND_TO_WALK: "start",
-    StrideKind.WALK_TO_STAND: "stop",
-    StrideKind.CHANGE_SPEED: "to another speed",
-    StrideKind.WALK_PUSH_OFF: "walking with push-off",
-    StrideKind.STEP_FORWARD: "step from a stand",
-    StrideKind.STEP_BACK: "step back from a stand",
-    StrideKind.HOP: "hopping",
-}
-"""Gaits by the superscripts of Table I, and of standing."""
-
-_PHASES = {
-    Phase.F: ("#eef2f6", "flight"),
-    Phase.SS: ("#cfe1f2", "single stance"),
-    Phase.DS: ("#f7dcc0", "double stance"),
-}
-_INK, _SECTION, _CHOICE, _PANEL = "#3a3f45", "#b3202a", "#8a9099", "#f9f9f7"
-# Lengths in drawing units; _INCH inches each.
-_INCH, _NODE = 0.58, 0.66
-_TITLE, _GAP = 0.35, 0.12
-_AROUND = 0.95  # height of an arrow that goes around nodes
-_FONT = 11.0
-_SAMPLES = np.linspace(0.0, 1.0, 41)
-
-
 def mathtext(name: str) -> str:
     """A node's or guard's name as in the paper: ``"SS_sc^w"`` is ``"$SS_{sc}^{w}$"``."""
     stem, _, gait = name.partition("^")
@@ -170,169 +111,119 @@ def words(name: Event | Reset) -> str:
     return name.name if name is Event.VLO else name.name.lower().replace("_", " ")
 
 
-def _route(start: Array, end: Array, bend: float, outward: Array) -> Array:
-    """Control points, shape (3, 2), of the quadratic Bezier arrow from circle to circle.
-
-    It is bent to the left by ``bend`` of their distance; from a circle to itself it is a loop
-    on the ``outward`` side.
-    """
-    span = end - start
-    distance = float(np.linalg.norm(span))
-    if distance == 0.0:
-        side = np.array([-outward[1], outward[0]])
-        rims = [start + _NODE * (0.8 * outward + s * 0.6 * side) for s in (-1.0, 1.0)]
-        return np.array([rims[0], start + 2.6 * _NODE * outward, rims[1]])
-    control = 0.5 * (start + end) + bend * np.array([-span[1], span[0]])
-    aims = [(control - point) / np.linalg.norm(control - point) for point in (start, end)]
-    rim = _NODE + 0.04
-    return np.array([start + rim * aims[0], control, end + rim * aims[1]])
-
-
-def _hides(a: str, b: str, centre: dict[str, Array]) -> bool:
-    """True if the straight line from ``a`` to ``b`` passes through another node."""
-    span = centre[b] - centre[a]
-    others = np.array([point - centre[a] for name, point in centre.items() if name not in (a, b)])
-    if a == b or not others.size:
-        return False
-    share = np.clip(others @ span / (span @ span), 0.0, 1.0)
-    return bool(np.any(np.linalg.norm(others - share[:, None] * span, axis=1) < _NODE))
-
-
-def _along(arrow: Array, t: Array) -> tuple[Array, Array]:
-    """Points of ``arrow`` and unit vectors to its left, each (n, 2), at ``t`` in [0, 1]."""
-    a, b, c = arrow
-    t = t[:, None]
-    d = (1 - t) * (b - a) + t * (c - b)
-    left = np.stack((-d[:, 1], d[:, 0]), axis=1) / np.linalg.norm(d, axis=1)[:, None]
-    return (1 - t) ** 2 * a + 2 * t * (1 - t) * b + t**2 * c, left
-
-
 def automaton_figure(automaton: Automaton) -> Figure:
-    """Fig. 2 of the paper from ``automaton``; failures are left out.
+    """Fig. 2 of the paper from ``automaton``, a panel a gait; failures are left out.
 
-    Circles are nodes, grouped by gait and coloured by phase; arrows are edges with guard,
-    section and reset. Grey dotted lines lead to starts that may be chosen at a section.
+    Circles are nodes, coloured by phase; arrows are edges with guard, section and reset, and where
+    they leave the gait the name of the node that they lead to. Below a gait that may be chosen at a
+    section stand the nodes that its stride starts instead of.
     """
-    centre = layout(automaton)
-    points = np.array(list(centre.values()))
-    low, high = points.min(axis=0) - PAD - 0.3, points.max(axis=0) + PAD + _TITLE + 0.3
-    low[1] -= 0.9  # the legend
-    width, height = _INCH * (high - low)
-    figure = Figure(figsize=(width, height))
+    figure = Figure()
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    x = y = low = 0.0
+    for gait, names in gaits(automaton).items():
+        radius = _radius(len(names))
+        side = 2.0 * (radius + _AROUND)
+        if x + side > _WIDTH:
+            x, y = 0.0, low - _GAP
+        _draw_gait(axes, automaton, gait, np.array([x + 0.5 * side, y - _TITLE - 0.5 * side]))
+        x, low = x + side + _GAP, min(low, y - _TITLE - side)
+    width, height = _WIDTH + 2.0 * _GAP, 3.0 * _GAP - low + 1.0
+    axes.set(xlim=(-_GAP, _WIDTH + _GAP), ylim=(_GAP - height, _GAP), aspect="equal")
     axes.set_axis_off()
-    FigureCanvasAgg(figure)  # its renderer measures the texts
-    legend = _draw_legend(axes, automaton)
-    figure.draw_without_rendering()  # puts the legend in its place
-    texts = [*_draw_panels(axes, automaton, centre), *_draw_nodes(axes, automaton, centre)]
-    _draw_edges(axes, automaton, centre, [_room(artist) for artist in (legend, *texts)])
+    figure.set_size_inches(_INCH * width, _INCH * height)
+    _draw_legend(axes, automaton)
     return figure
 
 
-def _draw_panels(axes: Axes, automaton: Automaton, centre: dict[str, Array]) -> Iterator[Text]:
-    """A titled box around each gait, dashed for the one only a controller sees."""
-    for gait, names in gaits(automaton).items():
-        points = np.array([centre[name] for name in names])
-        low, high = points.min(axis=0) - PAD, points.max(axis=0) + PAD
-        high[1] += _TITLE
-        width, height = high - low
-        box = FancyBboxPatch((low[0], low[1]), width, height, zorder=0)
-        box.set_boxstyle("round,pad=0,rounding_size=0.3")
-        box.set(facecolor=_PANEL, edgecolor="0.75", linestyle=_line(gait))
-        axes.add_patch(box)
-        title = GAIT_NAMES.get(gait, f"gait {gait}")
-        text = axes.text(low[0] + 0.25, high[1] - 0.18, title, fontsize=_FONT + 1, va="top")
-        text.set(fontweight="bold", color=_INK)
-        yield text
+def _radius(count: int) -> float:
+    """Radius of the circle that a gait's nodes are on."""
+    return max(_LEAST, _PITCH * count / (2.0 * np.pi)) if count > 1 else 0.0
 
 
-def _line(gait: str) -> str:
-    return "--" if gait.endswith("*") else "-"
-
-
-def _draw_nodes(axes: Axes, automaton: Automaton, centre: dict[str, Array]) -> Iterator[Text]:
-    for node in automaton.nodes:
-        x, y = centre[node.name]
-        circle = Circle((x, y), _NODE, facecolor=_PHASES[node.phase][0], zorder=3)
-        circle.set(edgecolor=_INK, linestyle=_line(node.gait))
+def _draw_gait(axes: Axes, automaton: Automaton, gait: str, middle: Array) -> None:
+    """A titled box, dashed for what only a controller sees, with the gait's nodes on a circle."""
+    names = gaits(automaton)[gait]
+    radius, line = _radius(len(names)), "--" if gait.endswith("*") else "-"
+    half = radius + _AROUND
+    left, low = (middle - half).tolist()
+    box = FancyBboxPatch((left, low), 2.0 * half, 2.0 * half + _TITLE, zorder=0)
+    box.set_boxstyle("round,pad=0,rounding_size=0.3")
+    box.set(facecolor=_PANEL, edgecolor="0.75", linestyle=line)
+    axes.add_patch(box)
+    top = low + 2.0 * half + _TITLE - 0.25
+    title = axes.text(left + 0.3, top, GAIT_NAMES.get(gait, f"gait {gait}"), va="top")
+    title.set(fontsize=_FONT + 1, fontweight="bold", color=_INK)
+    instead = [mathtext(a) for a, b in choices(automaton) if b == names[0]]
+    if instead:
+        text = f"starts instead of {' or '.join(instead)}"
+        axes.text(left + 0.3, top - 0.8, text, fontsize=_FONT, va="top", color=_CHOICE)
+    turns = 2.0 * np.pi * np.arange(len(names)) / len(names)
+    outward = np.stack((np.cos(turns), np.sin(turns)), axis=1)
+    centre = dict(zip(names, middle + radius * outward, strict=True))
+    for name, (x, y) in centre.items():
+        circle = Circle((x, y), _NODE, facecolor=_PHASES[automaton.node(name).phase][0])
+        circle.set(edgecolor=_INK, linestyle=line, zorder=3)
         axes.add_patch(circle)
-        text = axes.text(x, y, mathtext(node.name), fontsize=_FONT + 1, zorder=4)
-        text.set(ha="center", va="center")
-        yield text
-
-
-def _draw_edges(
-    axes: Axes, automaton: Automaton, centre: dict[str, Array], taken: list[Bbox]
-) -> None:
-    """Arrows first, then each label where it hides least."""
-    edges = list(successions(automaton))
-    pairs = [(a, b) for a, b, _ in edges]
-    arrows, around = [], 0
+        axes.text(x, y, mathtext(name), fontsize=_FONT + 1, ha="center", va="center", zorder=4)
+    edges = [(a, b, edge) for a, b, edge in successions(automaton) if a in centre]
     for i, (a, b, edge) in enumerate(edges):
-        same = pairs[:i].count((a, b))
-        bend = 0.18 * (same + (a != b and (b, a) in pairs))
-        if _hides(a, b, centre):
-            around += 1
-            bend += (-1) ** around * 2.0 * _AROUND / np.linalg.norm(centre[b] - centre[a])
-        gait = [centre[n] for n in gaits(automaton)[automaton.node(a).gait]]
-        # A gait of one node has its own loop face the middle, where there is room.
-        away = centre[a] - np.mean(gait, axis=0) - 1e-9 * centre[a]
-        arrow = _route(centre[a], centre[b], bend, away / np.linalg.norm(away))
-        arrows.append(arrow)
-        color = _SECTION if edge.section else _INK
-        _draw_arrow(axes, arrow, color, 2.2 if edge.section else 1.2, "-")
-    others = [_route(centre[a], centre[b], 0.14, np.zeros(2)) for a, b in choices(automaton)]
-    for other in others:
-        _draw_arrow(axes, other, _CHOICE, 1.2, ":")
-    curves = [_along(arrow, _SAMPLES)[0] for arrow in (*arrows, *others)]
-    outlines = [
-        patch.get_transform().transform_path(patch.get_path()).to_polygons()[0]
-        for patch in axes.patches
-        if not isinstance(patch, FancyArrowPatch)
-    ]
-    finer = [Path(outline).interpolated(40).vertices for outline in outlines]
-    ink = np.concatenate((axes.transData.transform(np.concatenate(curves)), *finer))
-    for arrow, (_, _, edge) in zip(arrows, edges, strict=True):
-        text = axes.text(0.0, 0.0, edge_label(edge), fontsize=_FONT - 1, linespacing=1.25)
-        color = _SECTION if edge.section else _INK
-        text.set(color=color, ha="center", va="center", zorder=5)
-        _place(axes, text, arrow, ink, taken)
-        taken.append(_room(text))
+        if b in centre and b != a:
+            follows = names.index(b) == (names.index(a) + 1) % len(names)
+            same = sum(other[:2] == (a, b) for other in edges[:i])
+            _draw_edge(axes, edge, centre[a], centre[b], _BEND * (follows + 3 * same))
+    for name, away in zip(names, turns, strict=True):
+        leaving = [(b, edge) for a, b, edge in edges if a == name and (b == a or b not in centre)]
+        for i, (target, edge) in enumerate(leaving):
+            turn = away + 1.1 * (i - 0.5 * (len(leaving) - 1))
+            way = np.array([np.cos(turn), np.sin(turn)])
+            _draw_leaving(axes, edge, centre[name], way, target)
 
 
-def _room(artist: Artist) -> Bbox:
-    """The box that ``artist`` takes on the page, and a little around it."""
-    return artist.get_window_extent().padded(6.0)
+def _arrow(axes: Axes, edge: Edge, begin: Array, end: Array, bend: float) -> None:
+    """An arrow from one place to another, bent to its right by a share of its length."""
+    ends = (begin[0], begin[1]), (end[0], end[1])
+    arrow = FancyArrowPatch(*ends, arrowstyle="-|>", shrinkA=0.0, shrinkB=0.0, zorder=2)
+    arrow.set(connectionstyle=f"arc3,rad={bend}", mutation_scale=12, color=_color(edge))
+    arrow.set_linewidth(2.2 if edge.section else 1.2)
+    axes.add_patch(arrow)
 
 
-def _draw_arrow(axes: Axes, arrow: Array, color: str, width: float, line: str) -> None:
-    path = Path(arrow, [Path.MOVETO, Path.CURVE3, Path.CURVE3])
-    patch = FancyArrowPatch(path=path, arrowstyle="-|>", mutation_scale=11 + width)
-    patch.set(linewidth=width, linestyle=line, color=color, zorder=2)
-    axes.add_patch(patch)
+def _color(edge: Edge) -> str:
+    return _SECTION if edge.section else _INK
 
 
-def _place(axes: Axes, text: Text, arrow: Array, ink: Array, taken: list[Bbox]) -> None:
-    """Put ``text`` next to ``arrow`` where it covers the least ink and nothing ``taken``."""
-    data, page = axes.transData, axes.bbox
-    corner = data.inverted().transform(text.get_window_extent().get_points())
-    half = 0.5 * (corner[1] - corner[0])
-    shares = np.array([0.5, 0.4, 0.6, 0.3, 0.7])
-    points, left = _along(arrow, shares)
-    normals = np.concatenate((left, -left))
-    spots = np.tile(points, (2, 1)) + normals * (_GAP + np.abs(normals) @ half)[:, None]
-    costs = []
-    for spot, share in zip(spots, np.tile(shares, 2), strict=True):
-        box = Bbox(data.transform([spot - half - 0.04, spot + half + 0.04]))
-        covered = np.all((ink > box.min) & (ink < box.max), axis=1).sum()
-        outside = not (page.contains(*box.min) and page.contains(*box.max))
-        clashes = box.count_overlaps(taken) + outside
-        costs.append(covered + 1e4 * clashes + abs(share - 0.5))
-    text.set_position(tuple(spots[int(np.argmin(costs))]))
+def _draw_edge(axes: Axes, edge: Edge, begin: Array, end: Array, bend: float) -> None:
+    """An arrow from rim to rim of two nodes, with its label beyond its bend, or on it."""
+    span = end - begin
+    right = np.array([span[1], -span[0]])
+    distance = np.linalg.norm(span)
+    # Where the curve crosses the rims, as if it was straight there.
+    along, across = span + 2.0 * bend * right, -span + 2.0 * bend * right
+    rims = [_NODE * way / np.linalg.norm(way) for way in (along, across)]
+    _arrow(axes, edge, begin + rims[0], end + rims[1], bend)
+    if bend:
+        place = 0.5 * (begin + end) + (0.5 * bend + _BEYOND / distance) * right
+    else:
+        place = begin + 0.45 * span
+    _label(axes, edge, place, edge_label(edge), ("center", "center"))
 
 
-def _draw_legend(axes: Axes, automaton: Automaton) -> Legend:
+def _draw_leaving(axes: Axes, edge: Edge, begin: Array, way: Array, target: str) -> None:
+    """An arrow that leaves a gait, or leads back to its node: the target stands at its end."""
+    _arrow(axes, edge, begin + _NODE * way, begin + (_NODE + _STUB) * way, 0.0)
+    sides = {-1: ("right", "top"), 0: ("center", "center"), 1: ("left", "bottom")}
+    (across, _), (_, up) = (sides[int(np.sign(np.round(part, 1)))] for part in way)
+    text = f"{edge_label(edge)}\nto {mathtext(target)}"
+    _label(axes, edge, begin + (_NODE + _STUB + 0.1) * way, text, (across, up))
+
+
+def _label(axes: Axes, edge: Edge, place: Array, text: str, side: tuple[str, str]) -> None:
+    shown = axes.text(place[0], place[1], text, fontsize=_FONT - 1, color=_color(edge), zorder=5)
+    shown.set(ha=side[0], va=side[1], bbox={"facecolor": _PANEL, "edgecolor": "none", "pad": 0.5})
+
+
+def _draw_legend(axes: Axes, automaton: Automaton) -> None:
     phases = dict.fromkeys(node.phase for node in automaton.nodes)
     sections = dict.fromkeys(e.event for _, _, e in successions(automaton) if e.section)
     names = " or ".join(words(event) for event in sections)
@@ -341,7 +232,4 @@ def _draw_legend(axes: Axes, automaton: Automaton) -> Legend:
         Line2D([], [], color=_INK, linewidth=1.2, label="guard (reset of the toes)"),
         Line2D([], [], color=_SECTION, linewidth=2.2, label=f"section: {names} ends the stride"),
     ]
-    if choices(automaton):
-        label = "a stride may start here instead"
-        handles.append(Line2D([], [], color=_CHOICE, linewidth=1.2, linestyle=":", label=label))
-    return axes.legend(handles=handles, loc="lower center", ncols=3, frameon=False, fontsize=_FONT)
+    axes.legend(handles=handles, loc="lower center", ncols=5, frameon=False, fontsize=_FONT)
