@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import logging
-import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -13,8 +12,8 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from template_control.errors import MissingPackageError, ParameterError
+from template_control.view.browser import HOST, free_port
 
-HOST = "127.0.0.1"
 PORTS = range(8080, 8180)
 """Tried in turn where no port is asked for."""
 _ENDS = 10.0  # [s] that a server's thread may take to end
@@ -97,7 +96,7 @@ class PageServer:
     def __init__(self, port: int | None) -> None:
         package = viser()
         logging.getLogger("websockets.server").addFilter(_is_news)
-        chosen = _free_port(PORTS if port is None else [port])
+        chosen = free_port(PORTS if port is None else [port])
         others = set(threading.enumerate())
         with _closed_to_others(), redirect_stdout(io.StringIO()):  # it prints a table
             self.viser = package.ViserServer(host=HOST, port=chosen, verbose=False)
@@ -118,16 +117,3 @@ class PageServer:
 
 def _is_news(record: logging.LogRecord) -> bool:
     return record.getMessage() != _UNUSED
-
-
-def _free_port(ports: range | list[int]) -> int:
-    for port in ports:
-        with socket.socket() as trial:
-            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                trial.bind((HOST, port))
-                return port
-            except OSError as error:
-                reason = error.strerror
-    where = f"port {ports[0]}" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]}"
-    raise ParameterError(f"the page does not start on {where} ({reason}): give another --port")

@@ -46,8 +46,8 @@ def replay(
         The server: ``url``, ``open_browser()``, ``wait()``, ``close()``.
 
     Raises:
-        ParameterError: if a number is out of its range.
-        RecordError: if the run or its robot cannot be shown, or the server does not start.
+        ParameterError: if a number is out of its range, or no port is free.
+        RecordError: if the run or its robot cannot be shown.
     """
     from template_control.view.replay.viewer import ReplayServer
 

@@ -16,8 +16,7 @@ from typing import Any
 import meshcat
 import umsgpack
 
-from template_control.errors import RecordError
-from template_control.view.browser import show_in_browser
+from template_control.view.browser import HOST, free_port, show_in_browser
 from template_control.view.style import COM, TEMPLATE
 
 _VIEWER = Path(meshcat.__file__).parent / "viewer" / "dist" / "main.min.js"
@@ -92,7 +91,7 @@ class ReplayServer:
     """A running server of a replay's HTML page; ends with :meth:`close` or the ``with`` block.
 
     ``port`` None takes the first free one from 7000 up; ``url`` is where a browser finds the
-    replay. A RecordError if the server does not start.
+    replay. A ParameterError if the server does not start.
     """
 
     def __init__(self, page: str, port: int | None = None) -> None:
@@ -109,8 +108,9 @@ class ReplayServer:
             def log_message(self, *_: object) -> None:
                 """Nothing: the terminal is the user's."""
 
-        self._server = _listening(Answer, _PORTS if port is None else [port])
-        self.url = f"http://127.0.0.1:{self._server.server_port}/"
+        chosen = free_port(_PORTS if port is None else [port])
+        self._server = _Server((HOST, chosen), Answer)
+        self.url = f"http://{HOST}:{chosen}/"
         Thread(target=self._server.serve_forever, daemon=True).start()
 
     def open_browser(self) -> bool:
@@ -133,20 +133,6 @@ class ReplayServer:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def _listening(answer: type[BaseHTTPRequestHandler], ports: Sequence[int]) -> ThreadingHTTPServer:
-    """A server on the first free port; a RecordError if none is free."""
-    for port in ports:
-        try:
-            return _Server(("127.0.0.1", port), answer)
-        except OSError as error:
-            reason = error.strerror
-    where = f"port {ports[0]}" if len(ports) == 1 else f"ports {ports[0]} to {ports[-1]}"
-    raise RecordError(
-        f"the replay's server does not start on {where} ({reason}): give another --port, or write a"
-        " page with --html"
-    )
 
 
 class _Server(ThreadingHTTPServer):
