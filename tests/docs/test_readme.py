@@ -12,6 +12,7 @@ import pytest
 from places import DOCS, ROOT
 from printed import EXAMPLE_ONE, WALK_SPEEDS, ZERO_FIVE_ZERO
 from printed import words as words_of
+from test_pages import RUN
 
 import template_control as tc
 from template_control.cli.main import main
@@ -93,7 +94,11 @@ ACTIVATE = ". .venv/bin/activate"
 PRINTED = [*(c for c in commands() if "python3 -m venv" not in c), *(c for p in SHORT for c in p)]
 ALL = dict.fromkeys(c for c in PRINTED if c != ACTIVATE)
 REPRODUCED = [line for line in ALL if line.startswith("template-control reproduce ")]
-ELSEWHERE = [*REPRODUCED, EXAMPLE_ONE, WALK_SPEEDS, ZERO_FIVE_ZERO]
+# A page that runs from top to bottom has these commands too.
+ON_A_PAGE = {
+    line for page in RUN for line in commands((DOCS / f"{page}.md").read_text()) if line in ALL
+}
+ELSEWHERE = [*REPRODUCED, EXAMPLE_ONE, WALK_SPEEDS, ZERO_FIVE_ZERO, *ON_A_PAGE]
 
 
 @pytest.mark.parametrize("page", PAGES)

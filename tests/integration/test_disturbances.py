@@ -27,7 +27,7 @@ def walk(robot, gait, **options):
     return simulate(Experiment(robot, planner=LqrPlanner(gait), **options))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def on_step(gait):
     """Nine steps over a step of the ground of this height before the fifth foothold."""
 

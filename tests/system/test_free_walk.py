@@ -30,7 +30,7 @@ def walked(course=None, steps=STEPS):
     ), gait
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def straight():
     return walked()
 

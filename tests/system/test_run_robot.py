@@ -29,7 +29,7 @@ P = SlipParameters()
 SWING = PHASES[Phase.F].swing
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def gait():
     return running_gait(P, 3.0)
 

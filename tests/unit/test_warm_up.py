@@ -26,6 +26,9 @@ def one():
 def two():
     note("two")
 
+def three():
+    note("three")
+
 def bad():
     raise ZeroDivisionError("of the part")
 """
@@ -70,15 +73,11 @@ def test_two_processes_share_the_parts_and_the_first_loads_all(prepare):
         by_process.setdefault(process, []).append(name)
     assert sorted(by_process.values()) == [["one", "one", "two"], ["two"]]
     assert said.count("compiling once") == 1
-
-
-@pytest.mark.slow(seconds=4)
-def test_what_is_kept_is_not_announced_again(prepare):
-    prepare(1, "one")
+    # What is kept is not announced again.
     notes, said = prepare(2, "one")
     assert [name for name, _ in notes] == ["one"]
     assert "compiling" not in said
-    assert "compiling" in prepare(1, "one", "two")[1]
+    assert "compiling" in prepare(1, "one", "three")[1]
 
 
 @pytest.mark.slow(seconds=4)

@@ -19,7 +19,7 @@ from template_control.view.replay.scene import in_space, scene_commands, turned_
 RADIUS = 0.01  # of the feet
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def record():
     """Three steps of the robot of human size, in a turn."""
     robot = tc.load_floating_robot("five-link-3d")

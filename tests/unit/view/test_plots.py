@@ -16,7 +16,7 @@ from template_control.view.state_figures import phase_portrait, section_states, 
 from template_control.view.style import Look, telling
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def gait(default_gait):
     return default_gait
 
@@ -26,7 +26,7 @@ def walk(gait, steps, **options):
     return tc.simulate(tc.Experiment(robot, planner=tc.LqrPlanner(gait), steps=steps, **options))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def record(gait):
     return walk(gait, 4, pushes=(tc.Push(impulse=5.0, step=2),))
 
