@@ -79,7 +79,7 @@ def test_ctrl_c_while_figures_are_drawn_keeps_the_run_and_its_table(tmp_path, ca
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(plots.view, "save_figures", interrupted)
+    monkeypatch.setattr(plots, "save_figures", interrupted)
     assert main(["walk", "--steps", "1", "--output", str(tmp_path)]) == 130
     told = capfd.readouterr()
     assert "mean speed" in told.out
