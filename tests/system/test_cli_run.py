@@ -72,8 +72,7 @@ def test_a_joint_speed_past_its_limit_is_marked(tmp_path, capfd, gait, monkeypat
         return figures
 
     monkeypatch.setenv("COLUMNS", "120")
-    module = "report" if gait == "go" else "motion"
-    monkeypatch.setattr(f"template_control.cli.{module}.summarise", narrowed)
+    monkeypatch.setattr("template_control.cli.motion.summarise", narrowed)
     words = [gait, *([SPEEDS] if gait == "go" else [])]
     steps = ["--steps", "1", "--no-figures", "--output", str(tmp_path)]
     assert main([*words, *steps]) == 0

@@ -196,7 +196,7 @@ def test_a_byte_order_mark_is_no_part_of_a_file(tmp_path):
     """Editors of some systems write one at the beginning of every file."""
     mark = "\ufeff"
     files = {
-        "run.toml": "[gait]\nspeed = 1.1\n",
+        "run.toml": '[motion]\nkind = "gait"\nspeed = 1.1\n',
         "scenario.toml": '[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 2\n',
         "ground.csv": "1.0, 0.0\n2.0, 0.1\n",
         "ground.toml": "points = [[1.0, 0.0], [2.0, 0.1]]\n",
