@@ -70,45 +70,29 @@ class Frame:
     arrow: Array
 
 
-@dataclass(frozen=True)
-class Body:
-    """What all frames of a run have in common.
+def frame_of(record: Record, sides: Array, columns: Mapping[str, Any]) -> Frame:
+    """The last of some ticks.
 
-    Attributes:
-        groups: contacts of each template leg.
+    Args:
+        record: of the run so far; its facts are read.
         sides: (n,) how far to the left a planar robot's feet are [m].
-        weight: [N].
-        length: the template's rest length [m].
+        columns: of :meth:`~.recorder.Recorder.latest`.
     """
-
-    groups: tuple[tuple[int, ...], ...]
-    sides: Array
-    weight: float
-    length: float
-
-    @classmethod
-    def of(cls, record: Record, sides: Array) -> Body:
-        """That of a recorded run."""
-        return cls(record.groups, sides, record.weight, float(record.template.rest_length))
-
-    def frame(self, columns: Mapping[str, Any]) -> Frame:
-        """The last of some ticks; ``columns`` are of :meth:`~.recorder.Recorder.latest`."""
-        last = {name: values[-1:] for name, values in columns.items()}
-        com, template, toes, foot, force = (found[0] for found in points(last, self.sides))
-        rear = int(last["rear"][0])
-        stands = last["contact_force"][0, :, 1] > CARRYING * self.weight
-        pushes = np.linalg.norm(last["template_force"][0], axis=1) > CARRYING * self.weight
-        return Frame(
-            q=last["q"][0],
-            heading=float(last["heading"][0]),
-            com=com,
-            template=template,
-            toes=leg_means(toes, [self.groups[leg] for leg in (rear, 1 - rear)]),
-            loaded=pushes,
-            foot=foot,
-            stands=stands,
-            arrow=force_arrows(force, stands, self.weight, self.length),
-        )
+    last = {name: values[-1:] for name, values in columns.items()}
+    com, template, toes, foot, force = (found[0] for found in points(last, sides))
+    rear, weight = int(last["rear"][0]), record.weight
+    stands = last["contact_force"][0, :, 1] > CARRYING * weight
+    return Frame(
+        q=last["q"][0],
+        heading=float(last["heading"][0]),
+        com=com,
+        template=template,
+        toes=leg_means(toes, [record.groups[leg] for leg in (rear, 1 - rear)]),
+        loaded=np.linalg.norm(last["template_force"][0], axis=1) > CARRYING * weight,
+        foot=foot,
+        stands=stands,
+        arrow=force_arrows(force, stands, weight, float(record.template.rest_length)),
+    )
 
 
 @dataclass(frozen=True)
@@ -158,7 +142,7 @@ class LiveScene:
         ground: that the robot walks on.
 
     Attributes:
-        body: what all frames have in common.
+        sides: (n,) how far to the left a planar robot's feet are drawn [m].
         joints: nodes of the robot's joints.
     """
 
@@ -167,10 +151,10 @@ class LiveScene:
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=False)
         model, shapes, visuals = load_visuals(record)
-        self.body = Body.of(record, foot_sides(model, record.feet))
+        self.sides = foot_sides(model, record.feet)
         self._scene, self._terrain = scene, ground
         self._model, self._data = model, model.createData()
-        self._length = length = self.body.length
+        self._length = length = float(record.template.rest_length)
         self._floating = isinstance(record, FloatingRecord)
         top = _top(model, shapes, record.q[0]) - float(ground.height_at(record.com[0, 0]))
         self._middle = max(_MIDDLE * length, 0.5 * top)

@@ -16,7 +16,7 @@ import template_control as tc
 from template_control.errors import ParameterError
 from template_control.view.live.pace import Pace
 from template_control.view.live.page import Figures, Step, first_push
-from template_control.view.live.scene import Body, LiveScene
+from template_control.view.live.scene import LiveScene, frame_of
 from template_control.view.live.server import PageServer, is_own
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals, model_of
 from template_control.view.replay.scene import in_space
@@ -80,7 +80,7 @@ def test_a_frame_is_what_a_replay_shows(floating):
         columns = run.recorder.latest(3)
         record = run.record()
     sides = foot_sides(model_of(record), record.feet)
-    frame, space = Body.of(record, sides).frame(columns), in_space(record, sides)
+    frame, space = frame_of(record, sides, columns), in_space(record, sides)
     for name in ("com", "template", "toes", "foot", "arrow"):
         np.testing.assert_array_equal(getattr(frame, name), getattr(space, name)[-1])
     np.testing.assert_array_equal(frame.q, record.q[-1])
@@ -100,7 +100,8 @@ def test_joints_are_drawn_where_they_are_and_what_stands_still_is_not_sent_again
     server = PageServer(None)
     try:
         scene = LiveScene(server.viser.scene, record, tc.Terrain.flat())
-        at = [scene.body.frame({k: v[: i + 1] for k, v in latest.items()}) for i in (20, 149)]
+        to = [{k: v[: i + 1] for k, v in latest.items()} for i in (20, 149)]
+        at = [frame_of(record, scene.sides, columns) for columns in to]
         for frame in at:
             scene.draw(frame)
         model, _, _ = load_visuals(record)
