@@ -6,8 +6,7 @@ import math
 from types import EllipsisType
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
+from template_control.arrays import Array
 
 
 class Range(NamedTuple):
@@ -86,7 +85,6 @@ class Rising(NamedTuple):
     """Two numbers, the second greater than the first."""
 
 
-Array = NDArray[np.float64]
 Positive = Annotated[float, Range(0.0, above=True)]
 NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]

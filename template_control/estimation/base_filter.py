@@ -7,15 +7,13 @@ from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Positive
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import LENGTH, SPEED, tuned
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -220,7 +218,7 @@ class BaseFilter:
         noise[self._speed] = (o.force_noise * dt) ** 2
         self._covariance = flow @ self._covariance @ flow.T + np.diag(noise)
 
-    def correct(self, joints: Array, contact: NDArray[np.bool_]) -> None:
+    def correct(self, joints: Array, contact: BoolArray) -> None:
         """Correct the estimate with the joints' angles (nu,) [rad] of the feet in contact (n,)."""
         robot, d = self.robot, self._d
         q = np.concatenate((self.base, joints))

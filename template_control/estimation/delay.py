@@ -6,16 +6,14 @@ import logging
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.slip.similarity import RATE_SQUARED, TIME, tuned
 from template_control.warm_up import Part, ready
-
-Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 

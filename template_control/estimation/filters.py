@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import FLOATING_DOF
 from template_control.slip.similarity import RATE_SQUARED, TIME, tuned
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -123,7 +121,7 @@ class NoiseFilter:
         self,
         measured: tuple[Array, Array],
         acceleration: Array,
-        contact: NDArray[np.bool_],
+        contact: BoolArray,
         dt: float,
     ) -> tuple[Array, Array]:
         """Update the estimate with one tick's measurement; the first one sets it.

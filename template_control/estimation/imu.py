@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.estimation.base_filter import BaseFilter, BaseFilterOptions, trunk_frame
@@ -15,8 +15,6 @@ from template_control.estimation.filters import JointFilter, JointFilterOptions
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.similarity import Scale, scaled
-
-Array = NDArray[np.float64]
 
 
 class Readings(NamedTuple):
@@ -34,7 +32,7 @@ class Readings(NamedTuple):
     joints: Array
     turning: Array
     specific_force: Array
-    contact: NDArray[np.bool_]
+    contact: BoolArray
 
 
 @dataclass(frozen=True)
@@ -147,7 +145,7 @@ class ImuSensors:
         self._before: tuple[Array, Array] | None = None
         self._expected = np.zeros(robot.nv)
 
-    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """As :meth:`~template_control.run.sensing.Senses.measure`."""
         dt = 0.0 if self._before is None else self._dt
         if self._before is None:
@@ -161,7 +159,7 @@ class ImuSensors:
         """As :meth:`~template_control.run.sensing.Senses.expect`."""
         self._expected = acceleration
 
-    def _read(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> Readings:
+    def _read(self, q: Array, v: Array, contact: BoolArray) -> Readings:
         o, draws, trunk, d = self._options, self._draws, self._trunk, self._robot.directions
         assert self._before is not None
         old_q, old_v = self._before

@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
@@ -33,8 +34,6 @@ from template_control.sweep.executor import workers
 from template_control.terminal import counted
 from template_control.view.figures import stick_diagram
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, Look, shade
-
-Array = NDArray[np.float64]
 
 _COLORS = (TEMPLATE, RIGHT, LEFT, COM)
 

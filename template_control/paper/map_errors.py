@@ -9,13 +9,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, Slot, StrideKind
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ def study(grid: Grid | None = None) -> ErrorStudy:
     return ErrorStudy(tried, relative.sum(axis=1), errors)
 
 
-def _may_touch_down(p: SlipParameters, z: Array, u: Array) -> NDArray[np.bool_]:
+def _may_touch_down(p: SlipParameters, z: Array, u: Array) -> BoolArray:
     """Conditions (29) and (30): the energy suffices for the next touchdown."""
     k, low = u[:, Slot.K_SC], p.rest_length * np.sin(u[:, Slot.TOUCHDOWN_ANGLE])
     at_rest = np.column_stack((np.zeros_like(low), low, np.zeros_like(low)))

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import (
@@ -36,8 +36,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.sweep.executor import workers
 from template_control.terminal import counted
 from template_control.view.stability_figures import basin_figure, deadbeat_figure
-
-Array = NDArray[np.float64]
 
 _RETURNS = 1e-7  # how exactly a step of the set must lead onto the equilibrium
 _ROUNDS = 100  # of the search for controls, at most
@@ -107,7 +105,7 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
     return ReturnMap(p)(found.state, controls).state
 
 
-def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> NDArray[np.bool_]:
+def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> BoolArray:
     """(n,) True if passive walking from a VLO state converges to the equilibria of a branch.
 
     The touchdown angle is that of the equilibrium with the state's energy; ``branch`` are stable
@@ -128,7 +126,7 @@ def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> NDArra
 
 
 def inside_share(
-    found: DeadbeatSet, settled: NDArray[np.bool_], least_angles: Array
+    found: DeadbeatSet, settled: BoolArray, least_angles: Array
 ) -> tuple[Array, float]:
     """Share of the set's states that settle, among those with at least a given touchdown angle.
 
@@ -188,7 +186,7 @@ def lower_limit() -> float:
     return high
 
 
-def basin_slice(energy: float) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+def basin_slice(energy: float) -> tuple[IntArray, BoolArray]:
     """Steps to fall and convergence (angles, heights) at an energy [J]."""
     gait = gait_from_energy(P, HEIGHT, energy)
     y, phi = np.meshgrid(_HEIGHTS, np.radians(_ANGLES))

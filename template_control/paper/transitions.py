@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.paper.map_errors import stride_figure
 from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
@@ -16,8 +16,6 @@ from template_control.slip.dynamics.stride import Stride, controls, simulate_str
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 P = SlipParameters()
 WRT_STATE = np.array([1.101, 0.9797, -0.0442])

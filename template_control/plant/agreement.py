@@ -7,14 +7,12 @@ from itertools import product
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RobotError
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import PLANAR_DOF
-
-Array = NDArray[np.float64]
 
 _ANGLES = (0.3, -0.4, 0.7, 0.5)  # [rad] joints in turn; any angles at which no term vanishes
 _CLOSE = 1e-6  # relative; engines agree to 1e-14

@@ -12,8 +12,9 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from template_control.arrays import Array
 from template_control.plant.agreement import trunk_corners
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain import pieces
@@ -23,8 +24,6 @@ from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.requirements import UNLIMITED
 from template_control.robot.sole import sole_balls
 from template_control.robot.terms import PLANAR_DOF
-
-Array = NDArray[np.float64]
 
 FOOT = "foot"
 TRUNK = "trunk"

@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
@@ -18,8 +18,6 @@ from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.robot.biped import Biped
 from template_control.robot.terms import FLOATING_DOF, PATCH, UP
-
-Array = NDArray[np.float64]
 
 _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 

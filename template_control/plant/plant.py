@@ -7,8 +7,8 @@ from importlib.util import find_spec
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
@@ -17,8 +17,6 @@ from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
 from template_control.plant.world import WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
-
-Array = NDArray[np.float64]
 
 
 @runtime_checkable

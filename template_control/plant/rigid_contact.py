@@ -20,14 +20,12 @@ from collections.abc import Iterable, Iterator
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
 from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
-
-Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # relative: forces and accelerations this small have no sign
 

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.warm_up import Part
-
-Array = NDArray[np.float64]
 
 _Three = tuple[float, float, float]
 _Four = tuple[float, float, float, float]

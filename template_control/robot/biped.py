@@ -10,8 +10,8 @@ from typing import Self
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.robot.legs import (
     add_foot_frame,
     foot_frame,
@@ -26,8 +26,6 @@ from template_control.robot.sole import Patch
 from template_control.robot.terms import UP, sources
 from template_control.robot.urdf import with_masses
 from template_control.structured import Number
-
-Array = NDArray[np.float64]
 
 SINGLE = ((0,), (1,))
 """Groups of a biped with point feet: each contact is a foot."""

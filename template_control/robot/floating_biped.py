@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.errors import ParameterError, RobotError
@@ -44,8 +44,6 @@ from template_control.robot.urdf_edits import (
     take_points,
 )
 from template_control.structured import Number, keep
-
-Array = NDArray[np.float64]
 
 _UNIT = 1e-12  # of a quaternion's square: what integrating it leaves
 _ROUNDED = 1e-3  # of its length: written with few digits

@@ -13,9 +13,8 @@ from math import atan2, cos, hypot, pi, sqrt
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from template_control.arrays import Array
 
 HINGES = 2  # hip and knee, the last joints of a leg with a point foot
 _PARALLEL = 1e-6  # 1 - cosine of the angle between two axes

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot.biped import MONOPOD, SINGLE, Biped
@@ -29,8 +29,6 @@ from template_control.robot.terms import PLANAR_DOF, gather_planar
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
 from template_control.robot.urdf_edits import complete, drop_world
 from template_control.structured import keep
-
-Array = NDArray[np.float64]
 
 _PITCH = 2  # place of the trunk's pitch in q
 

@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RobotError
 from template_control.robot.urdf import build_model, end_of
 from template_control.robot.urdf_edits import (
@@ -28,8 +28,6 @@ from template_control.robot.urdf_edits import (
     vector,
     vector_text,
 )
-
-Array = NDArray[np.float64]
 
 _BASE = (
     ("base_x", "prismatic", "1 0 0"),

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RobotError
 from template_control.robot.legs import (
     HINGES,
@@ -21,8 +21,6 @@ from template_control.robot.legs import (
 )
 from template_control.robot.terms import FLOATING_DOF, LEGS, PLANAR_DOF
 from template_control.robot.urdf import collision_shapes
-
-Array = NDArray[np.float64]
 
 UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _TURNS, _DEGREES = 12.6, 360.0  # stops between two turns in radians and one in degrees

@@ -7,13 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import DivergedError, RobotError
 from template_control.robot.terms import PATCH, ROBOT_DATA, Jacobians, gather_joints
 from template_control.structured import Number
-
-Array = NDArray[np.float64]
 
 WORLD_ALIGNED = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Positive, Triple
 from template_control.errors import RobotError
@@ -25,8 +25,6 @@ from template_control.robot.legs import (
 )
 from template_control.robot.urdf import collision_shapes
 from template_control.robot.urdf_edits import vector_text
-
-Array = NDArray[np.float64]
 
 _LEVEL = 2e-3  # points of a foot less than this above its lowest one belong to its sole [m]
 _SMALLEST = 0.01  # half side of a sole [m]

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple
 from template_control.errors import RobotError
@@ -18,8 +18,6 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import PLANAR_DOF
-
-Array = NDArray[np.float64]
 
 _SHORT = 0.15  # of a step of Newton's method [rad]
 _LONGEST = 0.2  # the same, of a floating-base robot [rad, m]

@@ -13,12 +13,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.robot.legs import carrying
-
-Array = NDArray[np.float64]
 
 PLANAR_DOF = 3
 """Degrees of freedom of a planar robot's base: x, z and pitch."""

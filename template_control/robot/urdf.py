@@ -15,11 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RobotError
-
-Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 

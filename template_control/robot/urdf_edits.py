@@ -11,8 +11,8 @@ from urllib.parse import unquote
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RobotError
 from template_control.robot.urdf import (
     MOMENTS,
@@ -24,8 +24,6 @@ from template_control.robot.urdf import (
     warn_once,
     why_impossible,
 )
-
-Array = NDArray[np.float64]
 
 _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begins with
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.run.record import FloatingRecord, Record
 from template_control.slip.similarity import Scale
 
@@ -43,17 +43,17 @@ def fall_cause(record: Record) -> str:
     return min(found, key=lambda name: found[name]) if found else "none of these"
 
 
-def _bears(record: Record) -> NDArray[np.bool_]:
+def _bears(record: Record) -> BoolArray:
     """(T, n) which feet are loaded."""
     weight = record.weight
     return np.asarray(record.contact_force[:, :, 1] > _BEARS * weight)
 
 
-def _failed(record: Record) -> NDArray[np.bool_]:
+def _failed(record: Record) -> BoolArray:
     return ~np.asarray(record.solved, dtype=bool)
 
 
-def _limited(record: Record) -> NDArray[np.bool_]:
+def _limited(record: Record) -> BoolArray:
     at_limit = np.abs(record.torque) >= _LIMIT * record.torque_limit
     long = _AT_LIMIT * Scale.of(record.template).time
     wrong = np.zeros(len(record.time), dtype=bool)
@@ -62,7 +62,7 @@ def _limited(record: Record) -> NDArray[np.bool_]:
     return wrong
 
 
-def _slipped(record: Record) -> NDArray[np.bool_]:
+def _slipped(record: Record) -> BoolArray:
     wrong = np.zeros(len(record.time), dtype=bool)
     for foot, bears in enumerate(_bears(record).T):
         if isinstance(record, FloatingRecord):
@@ -74,7 +74,7 @@ def _slipped(record: Record) -> NDArray[np.bool_]:
     return wrong
 
 
-def _stumbled(record: Record) -> NDArray[np.bool_]:
+def _stumbled(record: Record) -> BoolArray:
     friction = record.options["plant"].get("friction", np.inf)
     weight = record.weight
     force = record.contact_force
@@ -82,7 +82,7 @@ def _stumbled(record: Record) -> NDArray[np.bool_]:
     return np.asarray(pressed.any(axis=1))
 
 
-def _stretched(record: Record) -> NDArray[np.bool_]:
+def _stretched(record: Record) -> BoolArray:
     wrong = np.zeros(len(record.time), dtype=bool)
     for foot, (leg, bears) in enumerate(zip(record.hinges, _bears(record).T, strict=True)):
         # Down to the ankle, or the foot.
@@ -92,7 +92,7 @@ def _stretched(record: Record) -> NDArray[np.bool_]:
     return wrong
 
 
-def _late(record: Record) -> NDArray[np.bool_]:
+def _late(record: Record) -> BoolArray:
     index = np.searchsorted(record.section_time, record.time, side="right") - 1
     waited = record.time - record.section_time[np.maximum(index, 0)]
     durations = np.diff(record.section_time)
@@ -100,19 +100,19 @@ def _late(record: Record) -> NDArray[np.bool_]:
     return np.asarray(waited > _LATE * usual)
 
 
-def _lasts(true: NDArray[np.bool_], time: NDArray[np.float64]) -> NDArray[np.float64]:
+def _lasts(true: BoolArray, time: Array) -> Array:
     """(T,) for how long it has been true."""
     return np.where(true, time - _at_begin(time, true), 0.0)
 
 
-def _at_begin(value: NDArray[np.float64], true: NDArray[np.bool_]) -> NDArray[np.float64]:
+def _at_begin(value: Array, true: BoolArray) -> Array:
     """(T,) the value where the present stretch of ``true`` began; undefined outside of it."""
     begins = true & ~np.concatenate(([False], true[:-1]))
     last = np.maximum.accumulate(np.where(begins, np.arange(len(true)), 0))
     return np.asarray(value[last])
 
 
-_LOOKS: dict[str, Callable[[Record], NDArray[np.bool_]]] = {
+_LOOKS: dict[str, Callable[[Record], BoolArray]] = {
     "failed QP": _failed,
     "torque limit": _limited,
     "slip": _slipped,

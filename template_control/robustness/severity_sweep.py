@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from template_control import settings
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.embedding.planners.planner import Context
 from template_control.errors import ParameterError, RobotError, SweepError
@@ -40,8 +40,6 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.sweep.sweep import Item, SweepOptions, sweep
-
-Array = NDArray[np.float64]
 
 
 def template_limit(

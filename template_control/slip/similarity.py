@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Positive
 from template_control.slip.parameters import SlipParameters
@@ -86,7 +86,7 @@ class Scale(Checked):
         return self.factor(SPEED)
 
     @property
-    def state(self) -> NDArray[np.float64]:
+    def state(self) -> Array:
         """(3,) units of a section state dx/dt, y, dy/dt."""
         return np.array([self.speed, self.length, self.speed])
 

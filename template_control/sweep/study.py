@@ -8,10 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from template_control import settings
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index
 from template_control.errors import ParameterError, SweepError
@@ -19,9 +17,6 @@ from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.run.summary import summarise
 from template_control.sweep.sweep import Item, SweepOptions, SweepResult, grid, sample, sweep
-
-Array = NDArray[np.float64]
-
 
 _OPTIONS = SweepOptions(label="study")
 

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.progress import Progress
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.fitting import check, shown
 from template_control.checks.ranges import Count, Index, Range
@@ -56,7 +56,7 @@ class SweepResult:
         """Reason by index of the items that failed."""
         return {i: error for i, error in enumerate(self.errors) if error is not None}
 
-    def column(self, name: str | None = None) -> NDArray[np.float64]:
+    def column(self, name: str | None = None) -> Array:
         """One entry of every result, or the results themselves, as numbers.
 
         Args:
@@ -69,7 +69,7 @@ class SweepResult:
             SweepError: if a result has no such entry, or it is not numbers of one shape.
         """
         what = "the result" if name is None else repr(name)
-        values: dict[int, NDArray[np.float64]] = {}
+        values: dict[int, Array] = {}
         for i, (result, error) in enumerate(zip(self.results, self.errors, strict=True)):
             if error is None:
                 try:

@@ -13,12 +13,10 @@ then hold to machine precision whatever the QP's tolerance.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
-
-Array = NDArray[np.float64]
 
 
 @compiled

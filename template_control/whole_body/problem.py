@@ -25,15 +25,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.cholesky import cholesky
 from template_control.compiled import compiled
 from template_control.robot.terms import MOST_CONTACTS, PATCH, UP
 from template_control.whole_body.elimination import eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
-
-Array = NDArray[np.float64]
 
 _FAR = 1e20  # ProxQP's infinity
 _GRID = 2.0**24  # steps of a torque up to its limit

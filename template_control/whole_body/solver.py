@@ -26,8 +26,8 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.robot import Robot
@@ -47,8 +47,6 @@ from template_control.whole_body.problem import (
     torques,
 )
 from template_control.whole_body.stack import TaskStack
-
-Array = NDArray[np.float64]
 
 _LOG = logging.getLogger(__name__)
 

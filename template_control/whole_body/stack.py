@@ -6,16 +6,14 @@ from collections.abc import Sequence
 from math import isfinite
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.fitting import blame, name_of
 from template_control.errors import ParameterError
 from template_control.robot.robot import Robot
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT, References, Rows, Task
 from template_control.whole_body.task_rows import TASK, write_rows
 from template_control.whole_body.tasks import CompiledTask, ComTask
-
-Array = NDArray[np.float64]
 
 
 class TaskStack:

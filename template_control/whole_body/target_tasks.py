@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import NotNegative, Triple, Vector
 from template_control.errors import ParameterError
 from template_control.robot.robot import Robot
 from template_control.whole_body.task import Rows
-
-Array = NDArray[np.float64]
 
 _GAINS = (100.0, 20.0)  # kp [1/s^2] and kd [1/s]: critically damped, 0.1 s
 

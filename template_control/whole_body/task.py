@@ -11,12 +11,10 @@ import re
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.robot.terms import LEGS, MOST_CONTACTS
 from template_control.structured import Number
-
-Array = NDArray[np.float64]
 
 BIAS, DESIRED, WEIGHT = 0, 1, 2
 """Columns of a row behind its (nv,) Jacobian."""
@@ -87,12 +85,12 @@ class References:
         self.com: Array = now["com"]
         self.com_now: Array = now["com_now"]
         self.lean: Array = now["lean"]
-        self.feet: NDArray[np.int64] = now["feet"]
+        self.feet: IntArray = now["feet"]
         self.foot: Array = now["foot"]
         self.side: Array = now["side"]
         self.furthest: Array = now["furthest"]
         self.offset: Array = now["offset"]
-        self.stands: NDArray[np.int64] = now["stands"]
+        self.stands: IntArray = now["stands"]
         self.feet[1], self.furthest[:], self.pitch, self.ahead = 1, np.inf, pitch, np.nan
 
     com_push, pitch, lift, lead, ahead, sway = (

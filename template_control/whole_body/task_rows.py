@@ -11,13 +11,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.robot.terms import MOST_SPARE, UP, onward
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
-
-Array = NDArray[np.float64]
 
 _PITCH = 2  # place of a planar robot's pitch in q
 _SIDE = 1  # y of a floating-base robot's feet, to the left

@@ -37,6 +37,7 @@ SLIP_STAGES = (
     ("lateral", "scenario"),
 )
 SHARED = (
+    "arrays",
     "checks",
     "cholesky",
     "compiled",

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import IntArray
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import (
     MAX_EDGES,
@@ -74,9 +74,6 @@ class Node:
     def edge(self, event: Event) -> Edge | None:
         """The edge that ``event`` fires, or None."""
         return next((e for e in self.edges if e.event is event), None)
-
-
-IntArray = NDArray[np.int64]
 
 
 class Tables(NamedTuple):

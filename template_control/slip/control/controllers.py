@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, StrideKind
@@ -25,8 +26,6 @@ from template_control.slip.dynamics.stride import controls, finite
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.maps.section import VLO, Section
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 _ANGLE, _K_SC, _K_SD = Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD
 # A leg that touches the ground at the apex has a map without derivatives; so much flatter it falls

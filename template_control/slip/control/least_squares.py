@@ -9,12 +9,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
-
-Array = NDArray[np.float64]
 
 _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 _LESS = 0.1  # of the damping, after a step that does as foreseen; after a bad one as much more

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch
@@ -24,9 +24,6 @@ from template_control.slip.maps.return_map import (
     section_jacobian,
 )
 from template_control.slip.maps.section import PADDED
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _K_SC = int(Slot.K_SC)
 _K_SD = int(Slot.K_SD)

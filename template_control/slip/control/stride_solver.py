@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled, inner, inner_by_type
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
@@ -30,9 +30,6 @@ from template_control.slip.maps.return_map import (
     section_jacobian,
 )
 from template_control.slip.maps.section import PADDED, section_of
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _SECTION = int(Outcome.SECTION)
 LEAST_PULL = 1e-6

@@ -9,8 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.guards import (
@@ -24,8 +24,6 @@ from template_control.slip.dynamics.guards import (
 from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_lengths
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
 from template_control.slip.dynamics.model import Kernel, Model, backward, model_of
-
-Array = NDArray[np.float64]
 
 _NEWTON = 6
 

@@ -11,12 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import inner, inner_by_type
 from template_control.slip.automaton.vocabulary import Event
-
-Array = NDArray[np.float64]
 
 SERIES, STANCE, FLIGHT = 0, 1, 2
 COEFFICIENTS = 12

@@ -9,16 +9,14 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.compiled import inner
 from template_control.slip.automaton.hybrid import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.guards import COEFFICIENTS, SERIES, Path, all_bends, sample
 from template_control.slip.dynamics.locate import Watch, arm, first_event
 from template_control.slip.dynamics.model import ORDER, Kernel, expand, model_of, steepest
-
-Array = NDArray[np.float64]
 
 # Numba freezes module-level integers into the compiled code.
 _PLACE_REAR = int(Reset.PLACE_REAR)
@@ -68,7 +66,7 @@ class Scratch(NamedTuple):
     stiffness: Array
     values: Array
     bends: Array
-    armed: NDArray[np.bool_]
+    armed: BoolArray
 
 
 def new_scratch() -> Scratch:

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 from template_control.slip.dynamics.guards import (
@@ -22,9 +22,6 @@ from template_control.slip.dynamics.guards import (
     guard_rate,
     sample,
 )
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 _FALL = int(Event.FALL)
@@ -60,7 +57,7 @@ class Watch(NamedTuple):
     rest_length: float
     touchdown_height: float
     values: Array
-    armed: NDArray[np.bool_]
+    armed: BoolArray
     bends: Array
     out: Array
     probe: Array

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -18,8 +19,6 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome
 from template_control.slip.dynamics.kernel import new_scratch, plain, record_stride
 from template_control.slip.dynamics.model import Kernel, kernel_model
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 _OUTCOMES = tuple(Outcome)
 

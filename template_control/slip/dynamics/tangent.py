@@ -15,15 +15,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Reset, Slot
 from template_control.slip.dynamics.guards import SERIES, Path, guard_gradient, sample
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import ORDER, Kernel, Model, model_of
-
-Array = NDArray[np.float64]
 
 # Numba freezes module-level integers into the compiled code.
 _PLACE_REAR = int(Reset.PLACE_REAR)

@@ -11,15 +11,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Outcome, Reset
 from template_control.slip.dynamics.model import ORDER
 from template_control.slip.dynamics.stride import FiredEvent, Stride
-
-Array = NDArray[np.float64]
 
 TERMS = 6
 """Coefficients of a quintic."""

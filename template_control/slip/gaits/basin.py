@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Range, Shape
 from template_control.compiled import compiled, inner
@@ -22,9 +23,6 @@ from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.return_map import RESULTS, one_stride
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 _MOST = 100_000  # steps
 _SECTION = int(Outcome.SECTION)
@@ -112,7 +110,7 @@ def _steps(
 @compiled
 def _many(
     kernel: Kernel, z: Array, controls: Array, goal: Array, limit: int, scratch: Scratch
-) -> tuple[IntArray, NDArray[np.bool_]]:
+) -> tuple[IntArray, BoolArray]:
     """:func:`_steps` for every row of ``z``, ``controls`` and ``goal``."""
     steps, converges = np.zeros(z.shape[0], np.int64), np.zeros(z.shape[0], np.bool_)
     result = np.empty(RESULTS)
@@ -137,7 +135,7 @@ class StepsToFall:
     """
 
     steps: IntArray
-    converges: NDArray[np.bool_]
+    converges: BoolArray
     last: Array
 
 

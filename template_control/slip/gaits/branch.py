@@ -13,15 +13,12 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, ComplexArray
 from template_control.checks.checked import checked
 from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.maps.return_map import Linearisation
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 class Kind(Enum):

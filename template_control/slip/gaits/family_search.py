@@ -17,10 +17,10 @@ from dataclasses import asdict, dataclass, fields
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.linalg import LinAlgError, solve_discrete_are
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.errors import GaitError
@@ -31,8 +31,6 @@ from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians, without
 from template_control.slip.gaits.walking_by_speed import NATURAL, Chain, coordinates, nearest_gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.similarity import REFERENCE
-
-Array = NDArray[np.float64]
 
 _SAMPLES = 60
 _LITTLE = 0.02  # of a singular value

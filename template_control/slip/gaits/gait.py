@@ -9,9 +9,9 @@ from itertools import pairwise
 from typing import Annotated, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Shape, Triple
 from template_control.errors import GaitError
@@ -29,8 +29,6 @@ from template_control.slip.dynamics.stride import Stride, controls, simulate_str
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, section_of
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 WALKING_SLOTS: dict[str, tuple[Slot, ...]] = {
     StrideKind.WALK: (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, ComplexArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Vector
 from template_control.errors import GaitError, ParameterError
@@ -29,8 +29,6 @@ from template_control.slip.gaits.branch import (
 from template_control.slip.maps.return_map import Linearisation, ReturnMap
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 _COORDINATE = {"angle": -2, "stiffness": -1, "height": 1, "speed": 0}
 
@@ -248,7 +246,7 @@ def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisatio
 @checked
 def controlled_fixed_point(
     step: ReturnMap, policy: Policy, start: Vector
-) -> tuple[Array, NDArray[np.complex128]]:
+) -> tuple[Array, ComplexArray]:
     """Find where a controlled stride settles: Newton's method on z = P(z, u(z)).
 
     Args:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Positive
@@ -20,8 +20,6 @@ from template_control.slip.gaits.gait import flying
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 _SLOWEST, _FASTEST = 0.383, 1.597  # dx/dt at apex over sqrt(g l0): 1.2 to 5 m/s where l0 is 1 m
 _RANGES = {StrideKind.RUN: (_SLOWEST, _FASTEST), StrideKind.HOP: (-_SLOWEST, _SLOWEST)}

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
@@ -16,8 +16,6 @@ from template_control.slip.gaits.gait import WalkingGait, control_units
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import Slope
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 12
 _DONE = 1e-9

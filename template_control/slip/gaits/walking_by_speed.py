@@ -10,10 +10,10 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Angle
 from template_control.errors import GaitError
@@ -24,8 +24,6 @@ from template_control.slip.gaits.gait import WalkingGait, find_gait_at, gait_at,
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 _HEIGHT, _RISE = 1, 2  # places in a VLO state
 _COLUMNS = np.array(

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from template_control.arrays import Array, ComplexArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, NotNegative, Positive, Share
 from template_control.errors import GaitError
@@ -93,9 +93,6 @@ class Side(IntEnum):
         """Place in arrays with a row for each side: left, right."""
         return 0 if self is Side.LEFT else 1
 
-
-Array = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 _NEXT = 2 + NEXT  # column of the next foothold
 

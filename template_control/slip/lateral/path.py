@@ -25,14 +25,12 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import Leg, Reset
 from template_control.slip.dynamics.guards import SERIES, Path, sample
 from template_control.slip.dynamics.stride import Stride
-
-Array = NDArray[np.float64]
 
 NEXT = 2
 """Index of the next foothold; 0 and 1 are those of the rear and the front toe at the start."""
@@ -65,7 +63,7 @@ class LateralPath(NamedTuple):
 
     coefficients: Array
     meta: Array
-    footholds: NDArray[np.int64]
+    footholds: IntArray
     gravity: float
     longest: float
     touchdown: float
@@ -131,9 +129,7 @@ def _nodes(path: LateralPath) -> Array:
     return np.concatenate(nodes)
 
 
-def _footholds(
-    meta: Array, resets: Sequence[tuple[float, Reset]]
-) -> tuple[NDArray[np.int64], float, int]:
+def _footholds(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[IntArray, float, int]:
     """Foothold of each leg in each segment; time of the first landing, and next to which."""
     legs = np.arange(2)  # the foothold of each role
     landings: list[tuple[float, int]] = []

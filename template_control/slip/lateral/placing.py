@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import StrideKind
@@ -29,8 +29,6 @@ from template_control.slip.lateral.path import (
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.warm_up import Part
-
-Array = NDArray[np.float64]
 
 _STRETCH_GAIN = 0.2  # share of a stance's surprise that enters the stretch
 _STRETCHES = 0.9, 1.2  # of single stance; one that is longer or shorter was disturbed

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from template_control.arrays import Array, IntArray
 from template_control.checks.checked import checked
 from template_control.compiled import compiled, inner
 from template_control.errors import ParameterError
@@ -20,9 +21,6 @@ from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.dynamics.tangent import Tangents, new_tangents, stride_tangents
 from template_control.slip.maps.section import PADDED, section_of
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 # Numba would compile the stride once more for a literal.
 _LAST_ONLY, _RECORDED = np.bool_(False), np.bool_(True)

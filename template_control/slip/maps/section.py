@@ -6,13 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from template_control.arrays import Array, IntArray
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 PADDED = 3
 """Size of a padded state: dx/dt, y, dy/dt."""
@@ -42,7 +41,7 @@ class Section:
         return len(self.order)
 
     @cached_property
-    def _places(self) -> NDArray[np.int64]:
+    def _places(self) -> IntArray:
         """:attr:`order` as an array, which NumPy need not make of it each time."""
         return np.array(self.order)
 

@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import SpeedOrRest
@@ -25,8 +25,6 @@ from template_control.slip.dynamics.stride import finite
 from template_control.slip.gaits.gait import Gait as PeriodicGait
 from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

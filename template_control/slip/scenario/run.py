@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Annotated, Any, get_args, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
 from template_control import storage
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -30,8 +30,6 @@ from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import MOST_STRIDES, Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
-
-Array = NDArray[np.float64]
 
 FORMAT = "template-control scenario 2"
 _METADATA: dict[str, tuple[type, ...]] = {
@@ -69,11 +67,11 @@ class ScenarioRecord:
 
     time: Annotated[Array, "T"]
     state: Annotated[Array, "T 4"]
-    node: Annotated[NDArray[np.int64], "T <nodes"]
+    node: Annotated[IntArray, "T <nodes"]
     toes: Annotated[Array, "T 2"]
     stiffness: Annotated[Array, "T 2"]
     foothold: Annotated[Array, "F 2"]
-    stride: Annotated[NDArray[np.int64], "S <strides"]
+    stride: Annotated[IntArray, "S <strides"]
     section_time: Annotated[Array, "S+1"]
     section_state: Annotated[Array, "S+1 3"]
     wanted_speed: Annotated[Array, "S"]
@@ -81,7 +79,7 @@ class ScenarioRecord:
     predicted: Annotated[Array, "S 3"]
     controls: Annotated[Array, "S 6"]
     residual: Annotated[Array, "S"]
-    reached: Annotated[NDArray[np.bool_], "S"]
+    reached: Annotated[BoolArray, "S"]
     solve_seconds: Annotated[Array, "S"]
     metadata: dict[str, Any]
 

@@ -6,16 +6,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import StrideKind, WalkingStride
 from template_control.slip.maps.section import APEX, REST, VLO, Section, section_of
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND, Gait, Scenario, Segment
-
-Array = NDArray[np.float64]
 
 # A change of speed of a scenario that stands takes a stride of its own; dx/dt at VLO / sqrt(g l0):
 _STOPPABLE = 0.16  # from which one step leads to rest

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive
@@ -21,8 +21,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import SpeedAtTime, StrideGoal
 from template_control.slip.scenario.scenario import STAND, STAND_HEIGHT, Gait
 from template_control.slip.similarity import ACCELERATION, REFERENCE, SPEED, Scale, scaled, tuned
-
-Array = NDArray[np.float64]
 
 _FIRST_DURATION = 2.2  # of sqrt(l0 / g): guess of a step's duration before one was made
 # Changes of the gait, for the reference template.
