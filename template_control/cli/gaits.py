@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import sys
 from collections.abc import Callable
 from contextlib import nullcontext
 from pathlib import Path
@@ -32,10 +31,8 @@ from template_control.slip.control.controllers import (
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.branch import QUANTITIES, BranchPoint
 from template_control.slip.gaits.family_search import (
-    FamilyCost,
     Figures,
     Member,
-    SearchEffort,
     family_data,
     search_family,
 )
@@ -96,7 +93,6 @@ _STRIDES = {"walk": StrideKind.WALK, "run": StrideKind.RUN}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
 _TYPED = {**dict.fromkeys(QUANTITIES, Positive), "angle": Degrees}
 _TABLE_ROWS = 14
-_MOST_ROUNDS = 100
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -116,12 +112,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="make the family of walking gaits by speed anew instead: its file, as the library"
         " ships it, a figure and a table; about a minute",
-    )
-    parser.add_argument(
-        "--rounds",
-        type=values.whole(Range(0, _MOST_ROUNDS)),
-        default=0,
-        help="of descent on the cost of a family's gaits, which its file states",
     )
     parser.add_argument(
         "--fix",
@@ -169,7 +159,7 @@ def run(options: argparse.Namespace) -> int:
     wanted = _wanted(options)
     with nullcontext() if options.no_figures else writing(options.output) as folder:
         if wanted is None:
-            return make_family(folder, options.json, SearchEffort(rounds=options.rounds))
+            return make_family(folder, options.json)
         return _branch(options, wanted, folder)
 
 
@@ -183,8 +173,6 @@ def _wanted(options: argparse.Namespace) -> _Wanted | None:
         if idle:
             raise ParameterError(f"--{idle[0]} does not go with --family: leave one out")
         return None
-    if options.rounds:
-        raise ParameterError("--rounds goes with --family: leave it out, or give both")
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
     limits = (options.limits[0], options.limits[1]) if options.limits else defaults.limits
@@ -320,14 +308,13 @@ Chains = tuple[list[Member], ...]
 _TABLE_STEP = 0.1  # [m/s]
 
 
-def make_family(folder: Path | None, as_json: bool, effort: SearchEffort) -> int:
+def make_family(folder: Path | None, as_json: bool) -> int:
     """Search the family, write ``walking.json`` and its figure, print a table; the exit status.
 
     Without a folder no file is written; ``as_json`` prints the family instead of the table.
     """
-    weights, files = FamilyCost(), Files()
-    chains = search_family(weights, effort, lambda text: print(text, file=sys.stderr))
-    data = family_data(chains, weights)
+    files, chains = Files(), search_family()
+    data = family_data(chains)
     paths: list[Path | None] = []
     if folder is not None:
         text = json.dumps(data, indent=1) + "\n"

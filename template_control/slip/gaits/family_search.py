@@ -1,4 +1,4 @@
-"""Search for the family of walking gaits by speed: continuation, and descent on a stated cost.
+"""Search for the family of walking gaits by speed: continuation along stated lines.
 
 The family is two chains of gaits at equally spaced speeds at VLO, each on one branch: slow gaits
 with a long double stance, and faster ones with a short one. Where the rear leg just reaches its
@@ -6,14 +6,12 @@ rest length within double stance, it lifts off at once or much later: no branch 
 
 A chain begins as a rough line through a few gaits. It is smoothed, and each link is replaced by
 the gait nearest to it, again and again, until it is a smooth line on the surface of symmetric
-gaits. Then, where rounds are asked for, stretches of it are moved, in stiffness or angle, where
-that lowers the sum of the gaits' costs and of the chain's bends.
+gaits.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,126 +19,74 @@ from scipy.interpolate import PchipInterpolator
 from scipy.linalg import LinAlgError, solve_discrete_are
 
 from template_control.arrays import Array
-from template_control.checks.checked import Checked
-from template_control.checks.ranges import NotNegative, Positive
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians, without_push_off
-from template_control.slip.gaits.walking_by_speed import NATURAL, Chain, coordinates, nearest_gait
+from template_control.slip.gaits.walking_by_speed import Chain, coordinates, nearest_gait
 from template_control.slip.maps.section import VLO
 from template_control.slip.similarity import REFERENCE
 
 _SAMPLES = 60
-_LITTLE = 0.02  # of a singular value
+_LEG = 1.06  # length of the robot's leg, from the CoM on, over l0: the knee is never straight
 _STATE_COST = np.diag([10.0, 100.0, 10.0])  # of the planner, for l0 = 1 m
 _CONTROL_COST = (5.0, 2.0, 2.0, 2.0)
-_ERRORS = np.diag([0.05, 0.005, 0.05]) ** 2  # of dx/dt, y, dy/dt that a step may begin with
-
-
-@dataclass(frozen=True)
-class FamilyCost(Checked):
-    """Weights of a family's cost; all gaits are those of the reference template.
-
-    Attributes:
-        control: of the LQR's mean cost-to-go with four controls, from errors of 0.05 m/s, 5 mm
-            and 0.05 m/s.
-        authority: over the least singular value of the four controls' Jacobian and 0.02: where
-            that value vanishes, one direction of the state is out of their reach.
-        torque: of the largest knee torque of a leg without mass, over m g l0.
-        growth: of ln of the largest eigenvalue of the passive map, where that is above 1.
-        step: of the squared ln of the step length over ``lengths``.
-        speeds, lengths: mean speeds [m/s] and step lengths [m] that suit them, for l0 = 1 m:
-            long steps need high torques, short ones a fast swing.
-        shortest: a step takes at least so long [s], for l0 = 1 m: a swing leg needs the time.
-        leg: length of the robot's leg, from the CoM on, over l0: the knee is never straight.
-        bend: of the chain's squared second differences, in changes of ln k, alpha and y / l0
-            that count alike.
-    """
-
-    control: NotNegative = 10.0
-    authority: NotNegative = 0.02
-    torque: NotNegative = 1.0
-    growth: NotNegative = 0.15
-    step: NotNegative = 8.0
-    speeds: tuple[float, ...] = (0.2, 0.3, 0.5, 0.7, 0.9, 1.1, 1.3, 1.45)
-    lengths: tuple[float, ...] = (0.28, 0.32, 0.42, 0.49, 0.52, 0.55, 0.57, 0.54)
-    shortest: Positive = 0.33
-    leg: Positive = 1.06
-    bend: NotNegative = 2.0
 
 
 class Figures(NamedTuple):
-    """A gait's figures; those without unit are over m, g and l0.
+    """A gait's figures.
 
     Attributes:
         closed: largest absolute eigenvalue of the walk under the LQR's four controls.
         without: the same with the three of the paper.
         passive: largest absolute eigenvalue of the passive map.
-        authority: least singular value of the controls' Jacobian.
-        torque: largest knee torque of a leg without mass, over m g l0.
+        authority: least singular value of the controls' Jacobian: where it vanishes, one direction
+            of the state is out of their reach.
         double_stance: share of the step.
-        cost: by :func:`gait_figures`.
     """
 
     closed: float
     without: float
     passive: float
     authority: float
-    torque: float
     double_stance: float
-    cost: float
 
 
-def gait_figures(gait: WalkingGait, weights: FamilyCost) -> Figures:
-    """Figures and cost of a gait with push-off, on the reference template.
+def gait_figures(gait: WalkingGait) -> Figures:
+    """Figures of a gait with push-off, on the reference template.
 
     A GaitError if no control holds it.
     """
     a, b = vlo_jacobians(gait)
-    ahead, closed = _controlled(a, b)
+    closed = _controlled(a, b)
     if not np.isfinite(closed):
         raise GaitError(f"no control holds {gait!r}: give another gait")
-    passive = float(np.abs(np.linalg.eigvals(a)).max())
-    authority = float(np.linalg.svd(b)[1][2])
-    torque, double_stance = stance_figures(gait, weights.leg)
-    suited = float(np.interp(gait.mean_speed, weights.speeds, weights.lengths))
-    cost = (
-        weights.control * float(np.trace(ahead @ _ERRORS))
-        + weights.authority / (authority + _LITTLE)
-        + weights.torque * torque
-        + weights.growth * max(np.log(passive), 0.0)
-        + weights.step * np.log(gait.step_length / suited) ** 2
-    )
-    without = _controlled(*vlo_jacobians(without_push_off(gait)))[1]
     return Figures(
         closed=closed,
-        without=without,
-        passive=passive,
-        authority=authority,
-        torque=torque,
-        double_stance=double_stance,
-        cost=float(cost),
+        without=_controlled(*vlo_jacobians(without_push_off(gait))),
+        passive=float(np.abs(np.linalg.eigvals(a)).max()),
+        authority=float(np.linalg.svd(b)[1][2]),
+        double_stance=stance_figures(gait)[1],
     )
 
 
-def _controlled(a: Array, b: Array) -> tuple[Array, float]:
-    """Cost-to-go (3, 3) of the LQR and the largest absolute eigenvalue with it, NaN without one."""
+def _controlled(a: Array, b: Array) -> float:
+    """Largest absolute eigenvalue with the LQR, NaN where there is none."""
     costs = np.diag(_CONTROL_COST[: b.shape[1]])
     try:
         ahead = np.asarray(solve_discrete_are(a, b, _STATE_COST, costs))
     except (LinAlgError, ValueError):
-        return np.full((3, 3), np.nan), np.nan
+        return np.nan
     gain = np.linalg.solve(costs + b.T @ ahead @ b, b.T @ ahead @ a)
-    return ahead, float(np.abs(np.linalg.eigvals(a - b @ gain)).max())
+    return float(np.abs(np.linalg.eigvals(a - b @ gain)).max())
 
 
-def stance_figures(gait: WalkingGait, leg: float = FamilyCost.leg) -> tuple[float, float]:
+def stance_figures(gait: WalkingGait) -> tuple[float, float]:
     """Largest knee torque over m g l0, and the share of double stance, of a gait with push-off.
 
     A leg of two equal halves that pushes with F has the torque F times the knee's distance from the
-    line of the push. ``leg`` is the robot leg's length, from the CoM on, over l0.
+    line of the push.
     """
     p = gait.parameters
     stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
@@ -151,7 +97,7 @@ def stance_figures(gait: WalkingGait, leg: float = FamilyCost.leg) -> tuple[floa
     for toe, k in ((3, 5), (4, 6)):
         length = np.hypot(x - stride.meta[row, toe], y)
         force = stride.meta[row, k] * (p.rest_length - length)
-        knee = 0.5 * np.sqrt(np.clip((leg * p.rest_length) ** 2 - length**2, 0.0, None))
+        knee = 0.5 * np.sqrt(np.clip((_LEG * p.rest_length) ** 2 - length**2, 0.0, None))
         torque = max(torque, float(np.max(force * knee)))
     double = stride.time_of(Event.REAR_LIFTOFF) - stride.time_of(Event.TOUCHDOWN)
     return torque / (p.mass * p.gravity * p.rest_length), double / stride.duration
@@ -188,26 +134,9 @@ _FAST = (
     (1.25, 26.5, 69.3, 0.992),
     (1.44, 42.0, 72.0, 0.9995),
 )
-_STRETCH = 6  # half-width of what is moved at a time, in links
-_TOO_SHORT = 1e3
-_MOVED = 0.4, 0.2  # of a gait in the first and in the last round of the descent, in natural changes
-_SMOOTHING = 0.5  # of a round, in squared spacings of the chain
-_MOVES = np.array([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0)])
-
-
-@dataclass(frozen=True)
-class SearchEffort:
-    """Parameters of the search for a chain.
-
-    Attributes:
-        spacing: of a chain's speeds at VLO [m/s].
-        settling: rounds of smoothing, before the descent and after it.
-        rounds: of the descent; each takes a minute or more.
-    """
-
-    spacing: float = 0.015
-    settling: int = 12
-    rounds: int = 0
+_SPACING = 0.015  # of a chain's speeds at VLO [m/s]
+_SETTLING = 12  # rounds of each smoothing
+_SMOOTHING = 0.5, 0.05  # of a round of the first and the second one, in squared spacings
 
 
 class Member(NamedTuple):
@@ -217,34 +146,22 @@ class Member(NamedTuple):
     figures: Figures
 
 
-def search_family(
-    weights: FamilyCost | None = None,
-    effort: SearchEffort | None = None,
-    progress: Callable[[str], None] | None = None,
-) -> tuple[list[Member], ...]:
+def search_family(spacing: float = _SPACING, settling: int = _SETTLING) -> tuple[list[Member], ...]:
     """Family of walking gaits by speed: each chain's members, from the slowest to the fastest.
 
-    They are on the reference template. ``progress`` gets a line after each round of the descent. A
-    GaitError if a chain leaves the surface of gaits.
+    They are on the reference template. ``spacing`` is of a chain's speeds at VLO [m/s],
+    ``settling`` are rounds of each smoothing. A GaitError if a chain leaves the surface of gaits.
     """
-    w, o = weights or FamilyCost(), effort or SearchEffort()
-    return tuple(_search(np.array(rough), w, o, progress) for rough in (_SLOW, _FAST))
+    return tuple(_search(np.array(rough), spacing, settling) for rough in (_SLOW, _FAST))
 
 
-def _search(
-    rough: Array, w: FamilyCost, o: SearchEffort, progress: Callable[[str], None] | None
-) -> list[Member]:
-    speeds, chain = _rough(rough, o.spacing)
-    for _ in range(o.settling):
-        chain = _smoothed(_on_gaits(speeds, chain), _SMOOTHING)
-    for number, move in enumerate(np.linspace(*_MOVED, o.rounds)):
-        chain = _descended(speeds, _on_gaits(speeds, chain), float(move), w)
-        if progress is not None:
-            progress(f"{len(speeds)} gaits from {speeds[0]:.3g} m/s: round {number + 1} is done")
-    for _ in range(o.settling):
-        chain = _smoothed(_on_gaits(speeds, chain), 0.1 * _SMOOTHING)
+def _search(rough: Array, spacing: float, settling: int) -> list[Member]:
+    speeds, chain = _rough(rough, spacing)
+    for amount in _SMOOTHING:
+        for _ in range(settling):
+            chain = _smoothed(_on_gaits(speeds, chain), amount)
     gaits = [nearest_gait(REFERENCE, v, x) for v, x in zip(speeds.tolist(), chain, strict=True)]
-    return [Member(gait, gait_figures(gait, w)) for gait in gaits]
+    return [Member(gait, gait_figures(gait)) for gait in gaits]
 
 
 def _rough(rough: Array, spacing: float) -> tuple[Array, Array]:
@@ -276,41 +193,6 @@ def _smoothed(chain: Array, amount: float) -> Array:
     return np.asarray(np.linalg.solve(np.eye(len(chain)) + amount * bends.T @ bends, chain))
 
 
-def _descended(speeds: Array, chain: Array, move: float, weights: FamilyCost) -> Array:
-    """The chain with stretches moved where that lowers the sum of costs and bends."""
-    costs = np.array([_cost(v, x, weights) for v, x in zip(speeds.tolist(), chain, strict=True)])
-    places = np.arange(len(chain))
-    for centre in places[:: _STRETCH // 2]:
-        bump = np.maximum(1.0 - (places - centre) ** 2 / _STRETCH**2, 0.0) ** 2
-        stretch = np.flatnonzero(bump)
-        for change in move * _MOVES * NATURAL:
-            tried = chain.copy()
-            tried[stretch] += bump[stretch, None] * change
-            tried[stretch] = _on_gaits(speeds[stretch], tried[stretch])
-            new = costs.copy()
-            new[stretch] = [_cost(speeds[i], tried[i], weights) for i in stretch]
-            gain = np.sum(costs - new) + weights.bend * (_bends(chain) - _bends(tried))
-            if gain > 0.0:
-                chain, costs = tried, new
-                break
-    return chain
-
-
-def _cost(speed: float, x: Array, weights: FamilyCost) -> float:
-    """Of the gait nearest ``x``; infinite where there is none or its step is too short."""
-    try:
-        gait = nearest_gait(REFERENCE, speed, x)
-        figures = gait_figures(gait, weights)
-    except GaitError:
-        return np.inf
-    return figures.cost if gait.step_duration >= weights.shortest else _TOO_SHORT
-
-
-def _bends(chain: Array) -> float:
-    """Sum of the squared second differences, in natural changes."""
-    return float(np.sum((np.diff(chain, 2, axis=0) / NATURAL) ** 2))
-
-
 def chain_of(members: list[Member]) -> Chain:
     """The members of a chain without dimension."""
     p, gaits = REFERENCE, [member.gait for member in members]
@@ -325,12 +207,11 @@ def chain_of(members: list[Member]) -> Chain:
     )
 
 
-def family_data(chains: tuple[list[Member], ...], weights: FamilyCost) -> dict[str, Any]:
-    """The family as its file holds it, with the weights of the cost that it was made with."""
+def family_data(chains: tuple[list[Member], ...]) -> dict[str, Any]:
+    """The family as its file holds it."""
     return {
         "made by": "template-control gaits --family",
         "units": "l0, sqrt(l0 / g), m g; angles in rad",
-        "cost": asdict(weights),
         "chains": [
             {f.name: getattr(chain, f.name).tolist() for f in fields(chain)}
             for chain in map(chain_of, chains)

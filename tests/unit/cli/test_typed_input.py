@@ -105,7 +105,6 @@ def test_an_empty_path_is_refused_by_every_command(refused):
         ("gaits --step 0", "--step is 0: give a number above 0 and up to 0.5"),
         ("gaits --limits 0 4", "--limits is 0: give a positive number"),
         ("gaits --family --fix height=0.98", "--fix does not go with --family"),
-        ("gaits --rounds 3", "--rounds goes with --family"),
         ("campaign --severity 50 --trials 1", "the mix 50 times as severe: friction is"),
         ("campaign --speed 11", "--speed is 11: give a number from 0.01 to 10"),
     ],

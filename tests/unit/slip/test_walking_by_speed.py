@@ -16,8 +16,6 @@ from template_control.robot.library import ROBOTS
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits import family_search
 from template_control.slip.gaits.family_search import (
-    FamilyCost,
-    SearchEffort,
     gait_figures,
     search_family,
 )
@@ -99,7 +97,7 @@ def test_push_off_reaches_what_three_controls_do_not(gaits):
         small = np.linalg.svd(vlo_jacobians(without_push_off(gait))[1])[1][2]
         assert small < 1e-7
         assert np.linalg.svd(vlo_jacobians(gait)[1])[1][2] > 1e-4
-        figures = gait_figures(gait, FamilyCost())
+        figures = gait_figures(gait)
         three.append(figures.without)
         four.append(figures.closed)
     assert np.all(np.array(four) < np.array(three))
@@ -126,25 +124,11 @@ def test_the_nearest_gait_is_one_and_near(gaits):
         nearest_gait(REFERENCE, 3.0, guess)
 
 
-def test_a_search_makes_a_chain_and_lowers_its_cost(monkeypatch):
-    monkeypatch.setattr(family_search, "_SLOW", family_search._FAST[5:7])
-    monkeypatch.setattr(family_search, "_FAST", family_search._FAST[6:8])
-    told = []
-    effort = SearchEffort(spacing=0.09, settling=1, rounds=0)
-    before = search_family(effort=effort)
-    after = search_family(effort=SearchEffort(0.09, 1, 1), progress=told.append)
-    assert len(told) == 2
-    for first, second in zip(before, after, strict=True):
-        cost = [sum(member.figures.cost for member in chain) for chain in (first, second)]
-        assert cost[1] <= cost[0] + 1e-3
-        np.testing.assert_allclose([m.gait.vlo[2] for m in second], 0.0)
-
-
 def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(family_search, "_SLOW", family_search._FAST[5:7])
     monkeypatch.setattr(family_search, "_FAST", family_search._FAST[6:8])
-    quick = partial(SearchEffort, spacing=0.09, settling=1)
-    monkeypatch.setattr("template_control.cli.gaits.SearchEffort", quick)
+    quick = partial(search_family, spacing=0.09, settling=1)
+    monkeypatch.setattr("template_control.cli.gaits.search_family", quick)
     assert main(["gaits", "--family", "--output", str(tmp_path)]) == 0
     assert "largest eigenvalues" in capsys.readouterr().out
     made = json.loads((tmp_path / "walking.json").read_text())
@@ -152,7 +136,6 @@ def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys
     place = files("template_control.slip.gaits").joinpath("walking.json")
     shipped = json.loads(place.read_text())
     assert made.keys() == shipped.keys()
-    assert made["cost"] == shipped["cost"]
     assert [c.keys() for c in made["chains"]] == [c.keys() for c in shipped["chains"]]
 
 
