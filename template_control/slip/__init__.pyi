@@ -31,7 +31,6 @@ from .gaits.basin import vlo_state as vlo_state
 from .gaits.branch import BranchPoint as BranchPoint
 from .gaits.branch import Kind as Kind
 from .gaits.branch import Special as Special
-from .gaits.branch import closed_loop_eigenvalues as closed_loop_eigenvalues
 from .gaits.gait import Gait as Gait
 from .gaits.gait import WalkingGait as WalkingGait
 from .gaits.gait import gait_at as gait_at

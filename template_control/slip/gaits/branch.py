@@ -15,10 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, ComplexArray
-from template_control.checks.checked import checked
 from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.slip.maps.return_map import Linearisation
 
 
 class Kind(Enum):
@@ -53,18 +51,6 @@ def shell_eigenvalues(jacobian: Array, energy_gradient: Array) -> ComplexArray:
     """
     shell = np.linalg.svd(energy_gradient[None, :])[2][1:].T
     return np.linalg.eigvals(shell.T @ jacobian @ shell).astype(np.complex128)
-
-
-@checked
-def closed_loop_eigenvalues(linear: Linearisation, gain: Array) -> ComplexArray:
-    """Eigenvalues of z' = P(z, u_s - K (z - z_s)).
-
-    Args:
-        linear: the map at (z_s, u_s).
-        gain: (NUM_SLOTS, n) K.
-    """
-    closed = linear.state_jacobian - linear.control_jacobian @ gain
-    return np.linalg.eigvals(closed).astype(np.complex128)
 
 
 QUANTITIES = ("energy", "angle", "stiffness", "height", "speed")

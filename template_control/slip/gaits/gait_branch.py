@@ -14,7 +14,7 @@ import numpy as np
 from template_control.arrays import Array, ComplexArray
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Vector
-from template_control.errors import GaitError, ParameterError
+from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.control.controllers import VARIED, TargetedPolicy
 from template_control.slip.gaits.branch import (
@@ -148,7 +148,6 @@ def energy_gradient(
 Policy = Callable[[Array], Array]
 """Controls (NUM_SLOTS,) at a section state (n,)."""
 _DIFFERENCE = 1e-6
-_ITERATIONS = 30
 _NOISE = 1e-5  # of eigenvalues: a controller's search ends at 1e-10, over the difference
 
 
@@ -223,34 +222,24 @@ class ControlledFamily(Branch):
         return float(x[-1]), np.eye(self.n + 1)[-1]
 
     def _closed(self, x: Array) -> tuple[Linearisation, Array, Array]:
-        target = float(x[-1])
-        return closed_loop(self.map, lambda z: self.policy(z, target), x[:-1])
-
-
-def closed_loop(step: ReturnMap, policy: Policy, z: Array) -> tuple[Linearisation, Array, Array]:
-    """The exact stride with a policy's controls: linear map, (n, n) closed loop, u (NUM_SLOTS,).
-
-    ``step`` is the map z (n,) moves on, whatever map the policy computes with.
-    """
-    u = policy(z)
-    linear = step.linearise(z, u)
-    slope = np.column_stack(
-        [
-            (policy(z + _DIFFERENCE * e) - policy(z - _DIFFERENCE * e)) / (2.0 * _DIFFERENCE)
-            for e in np.eye(len(z))
-        ]
-    )
-    return linear, linear.state_jacobian + linear.control_jacobian @ slope, u
+        """The stride at X: linear map, (n, n) derivative of its end by z, u (NUM_SLOTS,)."""
+        z, target = x[:-1], float(x[-1])
+        u = self.policy(z, target)
+        linear = self.map.linearise(z, u)
+        steps = _DIFFERENCE * np.eye(self.n)
+        changes = [self.policy(z + e, target) - self.policy(z - e, target) for e in steps]
+        slope = np.column_stack(changes) / (2.0 * _DIFFERENCE)
+        return linear, linear.state_jacobian + linear.control_jacobian @ slope, u
 
 
 @checked
 def controlled_fixed_point(
     step: ReturnMap, policy: Policy, start: Vector
 ) -> tuple[Array, ComplexArray]:
-    """Find where a controlled stride settles: Newton's method on z = P(z, u(z)).
+    """Find where a controlled stride settles: a point of the :class:`ControlledFamily`.
 
     Args:
-        step: the map z moves on; the exact one, whatever map the policy computes with.
+        step: as for :class:`ControlledFamily`.
         policy: controls (NUM_SLOTS,) at a state (n,), such as
             ``lambda z: controller.solve(z, target).controls``.
         start: (n,) first guess.
@@ -261,13 +250,6 @@ def controlled_fixed_point(
     Raises:
         GaitError: if a stride fails on the way, or there is no convergence.
     """
-    z = np.array(start, dtype=float)
-    for _ in range(_ITERATIONS):
-        linear, closed, _ = closed_loop(step, policy, z)
-        if linear.outcome is not Outcome.SECTION:
-            raise GaitError(f"the controlled stride fails near {z.tolist()}")
-        miss = linear.state - z
-        if np.max(np.abs(miss)) < 1e-9:
-            return z, np.linalg.eigvals(closed).astype(np.complex128)
-        z = z + np.linalg.lstsq(np.eye(len(z)) - closed, miss, rcond=1e-10)[0]
-    raise GaitError("the controlled gait does not settle: give another start")
+    family = ControlledFamily(step, lambda z, _: policy(z), VARIED[0])
+    point = family.point(family.correct(np.append(start, 0.0), family.anchor))
+    return point.state, point.eigenvalues
