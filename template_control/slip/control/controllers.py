@@ -105,48 +105,6 @@ class Design:
         return grid
 
 
-ACTIVE_RUNNING = Design(
-    stride=StrideKind.RUN,
-    free=_LANDING,
-    axes={
-        (_ANGLE,): np.arange(52.0, 81.0, 4.0),
-        (_K_SC, _K_SD): (0.7, 1.0, 1.4, 2.0, 3.0),
-    },
-    margin=_APEX_MARGIN,
-    compression=0.9,
-)
-ACTIVE_WALKING = Design(
-    stride=StrideKind.WALK,
-    free=_LANDING,
-    axes={(_ANGLE,): np.arange(60.0, 79.0, 2.0), (_K_SD,): (0.8, 1.0, 1.2)},
-)
-MODIFIED_WALKING = Design(
-    stride=StrideKind.WALK,
-    free=(_ANGLE,),
-    axes={(_ANGLE,): np.arange(58.0, 81.0, 1.0)},
-    dense=True,
-    margin=0.05,
-)
-WALK_TO_RUN = Design(
-    stride=StrideKind.WALK_TO_RUN,
-    free=(Slot.K_SC_WR, Slot.K_SD_WR),
-    axes={
-        (Slot.K_SC_WR,): (0.4, 0.6, 0.9, 1.2, 1.6, 2.2),
-        (Slot.K_SD_WR,): (0.8, 1.4, 2.0, 2.6, 3.5, 6.0),
-    },
-)
-RUN_TO_WALK = Design(
-    stride=StrideKind.RUN_TO_WALK,
-    free=_LANDING,
-    axes={
-        (_ANGLE,): np.arange(60.0, 79.0, 3.0),
-        (_K_SC,): (1.0, 2.0, 3.5, 5.5),
-        (_K_SD,): (0.8, 1.1, 1.5),
-    },
-    margin=_APEX_MARGIN,
-)
-
-
 class Controller:
     """Finds the controls of one stride by least squares on a return map, (36) with weights of 1.
 
@@ -263,13 +221,26 @@ class ActiveRunning(Controller):
     The leg is wanted to be 0.9 l0 long at the bottom.
     """
 
-    design = ACTIVE_RUNNING
+    design = Design(
+        stride=StrideKind.RUN,
+        free=_LANDING,
+        axes={
+            (_ANGLE,): np.arange(52.0, 81.0, 4.0),
+            (_K_SC, _K_SD): (0.7, 1.0, 1.4, 2.0, 3.0),
+        },
+        margin=_APEX_MARGIN,
+        compression=0.9,
+    )
 
 
 class ActiveWalking(Controller):
     """VLO to VLO with kappa_1, kappa_2 and the angle: (36) and (37); see :class:`Controller`."""
 
-    design = ACTIVE_WALKING
+    design = Design(
+        stride=StrideKind.WALK,
+        free=_LANDING,
+        axes={(_ANGLE,): np.arange(60.0, 79.0, 2.0), (_K_SD,): (0.8, 1.0, 1.2)},
+    )
 
 
 class ModifiedWalking(Controller):
@@ -278,7 +249,13 @@ class ModifiedWalking(Controller):
     kappa_1 is k0, and kappa_2 from 0.5 to 1.5 k0. One control seldom reaches all of the target.
     """
 
-    design = MODIFIED_WALKING
+    design = Design(
+        stride=StrideKind.WALK,
+        free=(_ANGLE,),
+        axes={(_ANGLE,): np.arange(58.0, 81.0, 1.0)},
+        dense=True,
+        margin=0.05,
+    )
 
     def _prepare(self, target: Array, guess: Array | None) -> None:
         self._energy = Aim(target, _KAPPA_2 * self._map.parameters.leg_stiffness)
@@ -296,7 +273,14 @@ class WalkToRun(Controller):
             does; its reference then has to be tuned (Table IV).
     """
 
-    design = WALK_TO_RUN
+    design = Design(
+        stride=StrideKind.WALK_TO_RUN,
+        free=(Slot.K_SC_WR, Slot.K_SD_WR),
+        axes={
+            (Slot.K_SC_WR,): (0.4, 0.6, 0.9, 1.2, 1.6, 2.2),
+            (Slot.K_SD_WR,): (0.8, 1.4, 2.0, 2.6, 3.5, 6.0),
+        },
+    )
 
     @checked
     def __init__(
@@ -316,7 +300,16 @@ class WalkToRun(Controller):
 class RunToWalk(Controller):
     """Apex to VLO with both stiffnesses and the angle: (42) to (44); see :class:`Controller`."""
 
-    design = RUN_TO_WALK
+    design = Design(
+        stride=StrideKind.RUN_TO_WALK,
+        free=_LANDING,
+        axes={
+            (_ANGLE,): np.arange(60.0, 79.0, 3.0),
+            (_K_SC,): (1.0, 2.0, 3.5, 5.5),
+            (_K_SD,): (0.8, 1.1, 1.5),
+        },
+        margin=_APEX_MARGIN,
+    )
 
 
 TargetedPolicy = Callable[[Array, float], Array]

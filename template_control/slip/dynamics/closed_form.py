@@ -89,13 +89,8 @@ def harmonic(
 ) -> None:
     """Coefficients of (11) into ``a`` (12,), see :class:`~.guards.Path`.
 
-    Args:
-        a: overwritten.
-        start: at t = 0, about the pivot.
-        momentum: p / m, constant over the phase [m^2/s].
-        frequency_squared: omega_0^2 = k/m [1/s^2].
-        length: l0, or l_r0 of the AT-SLIP [m].
-        gravity: [m/s^2].
+    ``momentum`` is p / m, constant over the phase [m^2/s], ``frequency_squared`` omega_0^2 = k/m
+    [1/s^2], ``length`` l0, or l_r0 of the AT-SLIP [m].
     """
     pivot, r, theta, radial_speed = start
     omega = momentum / (length * length)
@@ -166,13 +161,8 @@ def corrected(
     to the right-hand side of the radial equation, which still has a closed-form solution.
     The angular rate p(t) / (m r(t)^2) is interpolated through the same three points.
 
-    Args:
-        a: (12,) first path, from :func:`harmonic`; overwritten.
-        t: time of the event that ends the phase on it [s].
-        momentum: p/m at the start [m^2/s].
-        toes, stiffness: (2,) of the legs; stiffness 0 for one in the air.
-        model: the template.
-        out: (6,) scratch.
+    ``a`` (12,) is the first path, from :func:`harmonic`, ``t`` the time of the event that ends the
+    phase on it [s], ``momentum`` p/m at the start [m^2/s], ``out`` (6,) scratch.
     """
     mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
     along = backward(model, stiffness)

@@ -113,11 +113,7 @@ _REST = int(Event.REST)
 def guard(
     event: int, state: Array, toes: Array, rest_length: float, touchdown_height: float
 ) -> float:
-    """Value of the guard of an Event (by its value); it fires when it rises through 0.
-
-    ``state`` (4 or more,) is x, y, dx/dt, dy/dt [m, m/s], ``toes`` (2,) x of rear and front toe
-    [m]; ``rest_length`` is l0, ``touchdown_height`` l0 sin(alpha) [m].
-    """
+    """Value of the guard of an event; it fires when it rises through 0."""
     x, y, u, v = state[0], state[1], state[2], state[3]
     if event == _TOUCHDOWN:
         return touchdown_height - y
@@ -148,8 +144,7 @@ def all_guards(
 ) -> None:
     """Write all guards at once into ``values`` (NUM_EVENTS,), by Event.
 
-    There is no branch in it, which makes it faster than :func:`guard` for a few of them. The rest
-    as for :func:`guard`.
+    There is no branch in it, which makes it faster than :func:`guard` for a few of them.
     """
     x, y, u, v = state[0], state[1], state[2], state[3]
     rear, front = x - toes[0], x - toes[1]
@@ -181,9 +176,8 @@ def all_bends(
     rises above zero; its bound is zero.
 
     Args:
-        state: (4,) x, y, dx/dt, dy/dt at the path's start [m, m/s].
-        toes: (2,) x of rear and front toe [m].
-        rest_length: l0 [m].
+        state: at the path's start.
+        toes, rest_length: of the template.
         steepest: bounds of speed, acceleration and jerk along the path [m/s, m/s^2, m/s^3].
         step: duration of the path [s].
         bends: (NUM_EVENTS,) overwritten, by Event.
@@ -203,11 +197,7 @@ def all_bends(
 
 @inner
 def guard_rate(event: int, path: Array, toes: Array) -> float:
-    """Time derivative of a guard along a path.
-
-    ``path`` (6,) is x, y and their first and second derivatives, ``toes`` (2,) x of rear and front
-    toe [m].
-    """
+    """Time derivative of a guard where x, y and their first two derivatives are ``path`` (6,)."""
     x, y, u, v = path[0], path[1], path[2], path[3]
     if event in (_TOUCHDOWN, _FALL):
         return -v
@@ -228,14 +218,7 @@ def guard_rate(event: int, path: Array, toes: Array) -> float:
 
 @inner
 def guard_gradient(event: int, state: Array, toes: Array, gradient: Array) -> None:
-    """Derivatives of a guard by x, y, dx/dt, dy/dt, both toes' x and the touchdown height.
-
-    Args:
-        event: value of the Event.
-        state: (4 or more,) x, y, dx/dt, dy/dt [m, m/s].
-        toes: (2,) x of rear and front toe [m].
-        gradient: (7,) overwritten.
-    """
+    """Write a guard's derivatives by state, both toes' x and the touchdown height: (7,)."""
     x, y, u, v = state[0], state[1], state[2], state[3]
     for i in range(7):
         gradient[i] = 0.0

@@ -92,11 +92,7 @@ def new_scratch() -> Scratch:
 
 @inner
 def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha: float) -> None:
-    """Move the toes as a reset of the automaton says.
-
-    ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s]; ``toes`` (2,), x of rear and front toe
-    [m], are overwritten; ``alpha`` is the touchdown angle, from the ground to the leg [rad].
-    """
+    """Move the ``toes`` as a reset of the automaton says."""
     if reset == _PLACE_REAR:
         toes[0] = state[0] + rest_length * np.cos(alpha)
     elif reset == _PLACE_FRONT:
@@ -110,11 +106,7 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
 
 @inner
 def note_lengths(event: int, state: Array, toes: Array, lengths: Array) -> None:
-    """Write legs' lengths [m] into ``lengths`` (3,) of :class:`Scratch` at a bottom or a touchdown.
-
-    ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s], ``toes`` (2,) x of rear and front toe
-    [m].
-    """
+    """Write legs' lengths [m] into ``lengths`` of :class:`Scratch` at a bottom or a touchdown."""
     if event in (_BOTTOM, _VIRTUAL_BOTTOM):
         for leg in range(2):
             lengths[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
@@ -133,13 +125,8 @@ def run_stride(
 ) -> tuple[int, int, int, int, float]:
     """Run the automaton from the kernel's node until a section or a failure.
 
-    Args:
-        kernel: automaton, template and first node.
-        state: (4,) x, y, dx/dt, dy/dt [m, m/s], overwritten with the final state.
-        toes: (2,) x of rear and front toe [m], overwritten.
-        controls: (NUM_SLOTS,) u: touchdown angle [rad] and stiffnesses [N/m] by Slot.
-        record: keep every segment and event; otherwise only the last is kept.
-        scratch: overwritten.
+    ``state`` and ``toes`` are overwritten with the final ones. If not to ``record``, only the last
+    segment and event are kept.
 
     Returns:
         Outcome, last node (the one entered, where the section was reached), number of segments,

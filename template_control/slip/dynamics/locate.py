@@ -42,9 +42,7 @@ class Watch(NamedTuple):
 
     Attributes:
         events: values of the node's Events, edge by edge.
-        toes: (2,) x of rear and front toe [m].
-        rest_length: l0 [m].
-        touchdown_height: l0 sin(alpha) [m].
+        toes, rest_length, touchdown_height: of the phase.
         values: (2, NUM_EVENTS) the guards at either end of a substep; from :func:`arm`.
         armed: (MAX_EDGES,) which may fire; from :func:`arm`.
         bends: (NUM_EVENTS,) bounds of the guards' second derivatives, from
@@ -69,8 +67,7 @@ def arm(watch: Watch, state: Array, fired: int) -> None:
 
     A guard that is zero there does not fire there. Exceptions are forbidden regions, and the
     touchdown of a foot that is on the ground already, unless the phase begins with a touchdown.
-    ``state`` (4,) is x, y, dx/dt, dy/dt of the CoM [m, m/s]; ``fired`` is the value of the Event
-    that the phase begins with, -1 at the start of a stride.
+    ``fired`` is the event that the phase begins with, -1 at the start of a stride.
     """
     events, values, armed = watch.events, watch.values, watch.armed
     all_guards(state, watch.toes, watch.rest_length, watch.touchdown_height, values[0])

@@ -72,10 +72,7 @@ def model_of(kernel: Kernel) -> Model:
 
 @inner
 def backward(model: Model, stiffness: Array) -> float:
-    """Acceleration along the ground by all but the springs, backward positive [m/s^2].
-
-    ``stiffness`` (2,) is the legs' [N/m], 0 for a leg in the air.
-    """
+    """Acceleration along the ground by all but the springs, backward positive [m/s^2]."""
     if stiffness[0] == 0.0 or stiffness[1] == 0.0:
         return model.along
     return model.along - model.assist
@@ -109,10 +106,7 @@ def expand(
     """Taylor coefficients of the CoM path from ``state``, and the step they are good for.
 
     Args:
-        state: (4,) x, y, dx/dt, dy/dt [m, m/s] in the world frame (y up).
-        toes: (2,) x of the rear and the front toe [m].
-        stiffness: (2,) stiffness [N/m] of the rear and front leg, 0 for a leg in the air.
-        model: the template.
+        state, toes, stiffness, model: at the start of the path.
         cx, cy: (ORDER + 1,) overwritten with x(t) = sum cx[i] t^i, and y.
         work: (2, 4, ORDER + 1) scratch.
 

@@ -143,7 +143,7 @@ def controls(
     return u
 
 
-def finite(name: str, values: Sequence[float] | Array, size: int) -> Array:
+def finite(name: str, values: ArrayLike, size: int) -> Array:
     """Copy numbers into a new (size,) array.
 
     A ParameterError, which calls them ``name``, if their shape is another or one is not finite.
@@ -196,9 +196,7 @@ class StrideSimulator:
     ) -> Stride:
         """Simulate one stride from the node ``start``, usually from ``STRIDE_START``.
 
-        ``state`` (4,) is x, y, dx/dt, dy/dt [m, m/s], ``u`` (NUM_SLOTS,) from :func:`controls`,
-        ``toes`` (2,) x of the rear and front toe [m]. A ParameterError for NaN, a wrong shape or an
-        unknown node.
+        Arguments and errors as for :func:`simulate_stride`.
         """
         if start not in self._kernels:
             raise ParameterError(
@@ -208,11 +206,7 @@ class StrideSimulator:
         x = finite("state", state, 4)
         c = finite("toes", toes, 2)
         outcome, node, segments, events, duration = record_stride(
-            self._kernels[start],
-            x,
-            c,
-            finite("controls", u, NUM_SLOTS),
-            self._plain,
+            self._kernels[start], x, c, finite("controls", u, NUM_SLOTS), self._plain
         )
         return Stride(
             outcome=_OUTCOMES[outcome],

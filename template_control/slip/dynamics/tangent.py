@@ -146,10 +146,8 @@ def _flight(step: float, flow: Array) -> None:
 def _stance(rear: bool, front: bool, step: float, tangents: Tangents) -> None:
     """Write the derivatives of a phase's end by its beginning into ``tangents.flow``.
 
-    Args:
-        rear, front: which legs are on the ground; :func:`_leg_series` has written their series.
-        step: duration of the phase [s].
-        tangents: overwritten.
+    ``rear`` and ``front`` say which legs are on the ground; :func:`_leg_series` has written their
+    series. ``step`` is the duration of the phase [s].
     """
     force, pull, flow = tangents.force, tangents.pull, tangents.flow
     dx, dy = tangents.series
@@ -226,13 +224,8 @@ def _fire(
 ) -> None:
     """Move the tangents' state from the event's time to where the guard is zero.
 
-    Args:
-        event: value of the Event.
-        at: (6,) x, y and their first and second derivatives at the event.
-        alpha: touchdown angle [rad].
-        toes: (2,) x of rear and front toe [m].
-        rest_length: l0 [m].
-        tangents: ``state`` and, where the event has them, ``lengths`` are overwritten.
+    ``at`` (6,) are x, y and their first and second derivatives at the event. Where the event has
+    ``lengths``, they are written too.
     """
     g, state, moved = tangents.guard, tangents.state, tangents.toes
     guard_gradient(event, at, toes, g)
@@ -281,13 +274,9 @@ def stride_tangents(
 ) -> None:
     """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded.
 
-    Args:
-        kernel: that the stride ran with.
-        controls: (NUM_SLOTS,) u of the stride.
-        segments, events: numbers of recorded ones.
-        scratch: with the stride's path and events.
-        tangents: ``state``, ``toes`` and ``lengths`` are overwritten with the derivatives at the
-            stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
+    ``segments`` and ``events`` are the numbers of recorded ones in ``scratch``. ``state``, ``toes``
+    and ``lengths`` of ``tangents`` are overwritten with the derivatives at the stride's end by
+    dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
     """
     tables, model = kernel.tables, model_of(kernel)
     alpha, rest_length = controls[0], model.rest_length

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -97,7 +96,6 @@ def _stride(x: Array, vlo_speed: float, weight: float, length: float) -> tuple[A
     return np.array([vlo_speed, x[2] * length, 0.0]), controls(float(x[1]), k, k)
 
 
-_FILE = "walking.json"
 _XTOL, _RTOL = 1e-10, 8.881784197001252e-16  # of speeds; scipy's least
 _ROUNDING = 1e-6  # of a centimetre per second
 
@@ -128,16 +126,11 @@ class Chain:
         return PchipInterpolator(self.vlo_speed, np.column_stack(columns))
 
     @cached_property
-    def _by_mean_speed(self) -> PchipInterpolator:
+    def vlo_by_mean_speed(self) -> PchipInterpolator:
+        """Speed and height at VLO by the mean speed, all without dimension."""
         return PchipInterpolator(
             self.mean_speed, np.column_stack((self.vlo_speed, self.height)), extrapolate=False
         )
-
-    def vlo_at(self, mean_speed: float) -> tuple[float, float]:
-        """Speed and height at VLO for a mean speed, all without dimension; ends count beyond."""
-        at = np.clip(mean_speed, self.mean_speed[0], self.mean_speed[-1])
-        speed, height = self._by_mean_speed(at).tolist()
-        return speed, height
 
     def gait(self, parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
         """The gait with a speed at VLO [m/s]; beyond the chain the nearest end's coordinates serve.
@@ -216,7 +209,8 @@ class SpeedFamily:
             dx/dt [m/s], y [m].
         """
         chain, unit = self._chain(parameters, mean_speed), parameters.speed_unit
-        speed, height = chain.vlo_at(mean_speed / unit)
+        known, by_speed = chain.mean_speed, chain.vlo_by_mean_speed
+        speed, height = by_speed(np.clip(mean_speed / unit, known[0], known[-1])).tolist()
         return speed * unit, height * parameters.rest_length
 
     def chain_of(self, gait: WalkingGait) -> Chain:
@@ -228,16 +222,12 @@ class SpeedFamily:
         return self.chains[int(np.searchsorted(inner, mean_speed / parameters.speed_unit))]
 
 
-def family_from(data: Mapping[str, Any]) -> SpeedFamily:
-    """The family that a file's ``data`` holds."""
-    chains = ({name: np.array(v) for name, v in chain.items()} for chain in data["chains"])
-    return SpeedFamily(tuple(Chain(**chain) for chain in chains))
-
-
 @cache
 def walking_by_speed() -> SpeedFamily:
     """The library's family, as ``template-control gaits --family`` made it."""
-    return family_from(json.loads(files(__package__).joinpath(_FILE).read_text(encoding="utf-8")))
+    data = json.loads(files(__package__).joinpath("walking.json").read_text(encoding="utf-8"))
+    chains = ({name: np.array(v) for name, v in chain.items()} for chain in data["chains"])
+    return SpeedFamily(tuple(Chain(**chain) for chain in chains))
 
 
 def family_speeds(parameters: SlipParameters) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outco
 from template_control.slip.dynamics.closed_form import closed_form_stride
 from template_control.slip.dynamics.kernel import Scratch, new_scratch, run_stride
 from template_control.slip.dynamics.model import Kernel, stride_kernel
+from template_control.slip.dynamics.stride import finite
 from template_control.slip.dynamics.tangent import Tangents, new_tangents, stride_tangents
 from template_control.slip.maps.section import PADDED, section_of
 from template_control.slip.parameters import SlipParameters
@@ -312,15 +312,9 @@ class ReturnMap:
         return result[: self.dimensions[1]], outcome
 
     def derivatives(self, z: Array, u: Array, columns: IntArray) -> tuple[Array, Array, Outcome]:
-        """One stride and chosen derivatives without checks, for inner loops.
+        """As :meth:`evaluate`, with the (RESULTS, c) derivatives of the result after it.
 
-        Args:
-            z: (n,) state at the section.
-            u: (NUM_SLOTS,) controls.
-            columns: (c,) what to differentiate by: 0 to 2 the state, 3 + slot the controls.
-
-        Returns:
-            (RESULTS,) as :meth:`evaluate`; its (RESULTS, c) derivatives; the outcome.
+        ``columns`` (c,) are what to differentiate by: 0 to 2 the state, 3 + slot the controls.
         """
         found = Derivatives(np.empty(RESULTS), np.empty((RESULTS, len(columns))))
         # A closed form moves both to and fro.
@@ -369,13 +363,10 @@ class ReturnMap:
         Raises:
             ParameterError: for a wrong shape or a number that is not finite.
         """
-        states = _checked("state", z, self.dimensions[0])
-        inputs = _checked("controls", u, NUM_SLOTS)
-        if states.ndim != 1 or inputs.ndim != 1:
-            raise ParameterError("linearise takes one state and one control vector")
         n, m = self.dimensions
-        columns: Sequence[int] = [*range(n), *range(PADDED, PADDED + NUM_SLOTS)]
-        result, jacobian, outcome = self.derivatives(states, inputs, np.array(columns))
+        columns = np.array([*range(n), *range(PADDED, PADDED + NUM_SLOTS)])
+        state, controls = finite("state", z, n), finite("controls", u, NUM_SLOTS)
+        result, jacobian, outcome = self.derivatives(state, controls, columns)
         return Linearisation(result[:m], outcome, jacobian[:m, :n], jacobian[:m, n:])
 
 

@@ -26,7 +26,7 @@ from template_control.slip.control.controllers import (
     WalkToRun,
 )
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
-from template_control.slip.maps.section import APEX, PADDED, VLO, section_of
+from template_control.slip.maps.section import PADDED, VLO, section_of
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import MOST_STRIDES, Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
@@ -237,13 +237,9 @@ def simulate_scenario(
     moving = scenario.in_motion()
     if moving is None:
         raise ScenarioError("the template cannot stand: give the scenario a segment that walks")
-    scenario, p = moving, moving.parameters
-    route, controllers, simulator = (
-        ScenarioRoute(scenario),
-        _Controllers(scenario),
-        StrideSimulator(p),
-    )
-    log, now, failure = _Log(p.rest_length), 0.0, ""
+    route, controllers = ScenarioRoute(moving), _Controllers(moving)
+    simulator = StrideSimulator(moving.parameters)
+    log, now, failure = _Log(moving.parameters.rest_length), 0.0, ""
     section, state = route.section, route.section.state(route.start)
     log.arrive(now, state)
     while True:
@@ -274,13 +270,12 @@ def simulate_scenario(
             failure = f"stride {len(log.goals)} ({goal.stride}): {stride.outcome.reason}"
             break
         section = section_of(AUTOMATON.sections(start)[1])
-    return _record(scenario, log, failure)
+    return _record(moving, log, failure)
 
 
 def _padded(states: list[Array]) -> Array:
-    """(S, 3) states at VLO or apex."""
-    of_size = {section.dimension: section for section in (VLO, APEX)}
-    return np.array([of_size[len(z)].padded(z) for z in states]).reshape(len(states), PADDED)
+    """(S, 3) states at VLO or apex, where dy/dt is 0."""
+    return np.array([[*z, 0.0][:PADDED] for z in states]).reshape(len(states), PADDED)
 
 
 def _record(scenario: Scenario, log: _Log, failure: str) -> ScenarioRecord:
