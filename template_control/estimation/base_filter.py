@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -33,38 +32,11 @@ class BaseFilterOptions(Checked):
     creep: Positive = tuned(0.01, SPEED)
 
 
-class TrunkFrame(Protocol):
-    """Place and rotation of a robot's trunk, in the plane or in space.
-
-    d are the directions, a the axes about which it turns.
-    """
-
-    axes: int
-
-    def rotation(self, base: Array) -> Array:
-        """(d, d) from the trunk to the world, of a configuration, or of its base (nq - nu,)."""
-
-    def turned(self, base: Array, angle: Array) -> Array:
-        """The configuration after a turn by ``angle`` (a,) about the trunk's axes [rad]."""
-
-    def swept(self, rotation: Array, vector: Array) -> Array:
-        """(d, a) derivative of ``rotation`` times a vector of the trunk (d,) by such an angle."""
-
-    def rolled(self, q: Array) -> Array:
-        """(n, d) by how much the spheres of the feet have rolled on [m].
-
-        The robot has been updated with ``q`` (nq,).
-        """
-
-    def middle(self, base: Array, other: Array) -> Array:
-        """(d, d) rotation half-way between two configurations."""
-
-    def velocity_axes(self, base: Array) -> Array:
-        """(d, d) from the axes in which v has the base's velocity to the world's."""
-
-
 class PlanarTrunk:
-    """See :class:`TrunkFrame`."""
+    """Place and rotation of a planar robot's trunk.
+
+    d are the directions, 2 in the plane, a the axes about which the trunk turns, 1 in the plane.
+    """
 
     axes = 1
 
@@ -72,36 +44,39 @@ class PlanarTrunk:
         self._robot = robot
 
     def rotation(self, base: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """(d, d) from the trunk to the world, of a configuration, or of its base (nq - nu,)."""
         sine, cosine = np.sin(base[2]), np.cos(base[2])
         return np.array([[cosine, sine], [-sine, cosine]])
 
     def turned(self, base: Array, angle: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """The configuration after a turn by ``angle`` (a,) about the trunk's axes [rad]."""
         return np.concatenate((base[:2], base[2:] + angle))
 
     def swept(self, rotation: Array, vector: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """(d, a) derivative of ``rotation`` times a vector of the trunk (d,) by such an angle."""
         forward, up = rotation @ vector
         return np.array([[up], [-forward]])
 
     def rolled(self, q: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """(n, d) by how much the spheres of the feet have rolled on [m].
+
+        The robot has been updated with ``q`` (nq,).
+        """
         robot = self._robot
         angle = robot.foot_turning[: len(robot.feet)] @ q
         return np.stack((robot.foot_radius * angle, np.zeros(len(angle))), axis=1)
 
     def middle(self, base: Array, other: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """(d, d) rotation half-way between two configurations."""
         return self.rotation(0.5 * (base + other))
 
     def velocity_axes(self, base: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """(d, d) from the axes in which v has the base's velocity to the world's."""
         return np.eye(2)
 
 
 class FloatingTrunk:
-    """See :class:`TrunkFrame`; the base is a place and a quaternion (x, y, z, w)."""
+    """As :class:`PlanarTrunk`, in space; the base is a place and a quaternion (x, y, z, w)."""
 
     axes = 3
 
@@ -111,20 +86,20 @@ class FloatingTrunk:
         self._rolled = np.zeros((len(robot.feet), 3))
 
     def rotation(self, base: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """See :class:`PlanarTrunk`."""
         return np.asarray(pin.Quaternion(base[3:7]).toRotationMatrix())
 
     def turned(self, base: Array, angle: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """See :class:`PlanarTrunk`."""
         quaternion = pin.Quaternion(base[3:7]) * pin.Quaternion(pin.exp3(angle))
         return np.concatenate((base[:3], quaternion.normalized().coeffs()))
 
     def swept(self, rotation: Array, vector: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """See :class:`PlanarTrunk`."""
         return np.asarray(-rotation @ pin.skew(vector))
 
     def rolled(self, q: Array) -> Array:
-        """See :class:`TrunkFrame`: the turns of the feet since the last call are added."""
+        """See :class:`PlanarTrunk`: the turns of the feet since the last call are added."""
         feet, before = self._robot.foot_rotation, self._feet
         self._feet = feet
         if before is not None and self._robot.foot_radius:
@@ -134,16 +109,16 @@ class FloatingTrunk:
         return self._rolled
 
     def middle(self, base: Array, other: Array) -> Array:
-        """See :class:`TrunkFrame`."""
+        """See :class:`PlanarTrunk`."""
         rotation = self.rotation(base)
         return np.asarray(rotation @ pin.exp3(0.5 * pin.log3(rotation.T @ self.rotation(other))))
 
     def velocity_axes(self, base: Array) -> Array:
-        """See :class:`TrunkFrame`: the trunk's."""
+        """See :class:`PlanarTrunk`: the trunk's."""
         return self.rotation(base)
 
 
-def trunk_frame(robot: PlanarBiped | FloatingBaseBiped) -> TrunkFrame:
+def trunk_frame(robot: PlanarBiped | FloatingBaseBiped) -> PlanarTrunk | FloatingTrunk:
     """The trunk's frame of a robot of either kind."""
     return FloatingTrunk(robot) if isinstance(robot, FloatingBaseBiped) else PlanarTrunk(robot)
 
