@@ -28,6 +28,7 @@ from template_control.run.simulation import simulate
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Leg, Outcome, Phase, Reset, Slot
 from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
@@ -111,19 +112,6 @@ PHASES = {
 }
 
 
-@dataclass(frozen=True)
-class Hop:
-    """A hop on the spot that returns to its apex."""
-
-    state: np.ndarray
-    controls: np.ndarray
-    step_duration: float
-    name: str = "hop"
-    parameters: SlipParameters = P
-    stride: str = "hop"
-    step_length: float = 0.0
-
-
 class Deadbeat(Planner):
     """The controls that lead to the target in one hop, by least squares on the exact map."""
 
@@ -131,7 +119,7 @@ class Deadbeat(Planner):
         u = np.array([0.5 * np.pi, P.leg_stiffness, P.leg_stiffness, 0.0, 0.0, 0.0])
         z = np.array([0.0, height])
         stride = simulate_stride(P, "F_aa^hop", APEX.state(z), u, automaton=HOPPING)
-        self.gait = Hop(z, u, stride.duration)
+        self.gait = Gait("hop", P, z, u, 0.0, stride.duration, "hop")
         self.offset = np.zeros(3)
         self._map = ReturnMap(P, "hop", automaton=HOPPING)
 

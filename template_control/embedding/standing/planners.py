@@ -7,7 +7,7 @@ one forward: all is planned forward, and turned round.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -66,38 +66,11 @@ _SOON = 1e-3  # [s]
 _LAUNCH = 0.05
 
 
-@dataclass(frozen=True)
-class StandingGait:
-    """A stand as a gait: a stride that returns to its state.
-
-    Attributes:
-        parameters: the template.
-        state: (3,) dx/dt, y, dy/dt at rest.
-        controls: (NUM_SLOTS,) zero: no spring carries.
-        step_duration: of a beat [s].
-        step_length: 0 [m].
-        stride: its kind.
-        name: for tables and records.
-    """
-
-    parameters: SlipParameters
-    state: Array
-    controls: Array
-    step_duration: float
-    step_length: float = 0.0
-    stride: str = StrideKind.STAND
-    name: str = "standing"
-
-    @classmethod
-    def of(cls, parameters: SlipParameters, options: StandingOptions) -> StandingGait:
-        """The stand of a template.
-
-        Args:
-            parameters: the template.
-            options: tuning, for that template.
-        """
-        state = np.array([0.0, options.height, 0.0])
-        return cls(parameters, state, np.zeros(NUM_SLOTS), BEAT * Scale.of(parameters).time)
+def standing_gait(passes: PassTable) -> Gait:
+    """A stand as a gait: a stride that returns to its state, in a beat; no spring carries."""
+    state = np.array([0.0, passes.options.height, 0.0])
+    beat, none = BEAT * passes.scale.time, np.zeros(NUM_SLOTS)
+    return Gait("standing", passes.parameters, state, none, 0.0, beat, StrideKind.STAND)
 
 
 class CurvePlanner(Planner):
@@ -120,7 +93,7 @@ class CurvePlanner(Planner):
         self._beat = BEAT * passes.scale.time
         self._launch = _LAUNCH * passes.parameters.rest_length
         self._speed = 0.0  # at VLO, to which the last curve leads [m/s]
-        stand = StandingGait.of(passes.parameters, passes.options)
+        stand = standing_gait(passes)
         self.gait: Gait = stand if walk is None else walk.gait
 
     def reset(self) -> None:
@@ -269,7 +242,7 @@ class StepPlanner(Planner):
         self._launch = _LAUNCH * passes.parameters.rest_length
         self._beat = BEAT * passes.scale.time
         self.landings = landings or LandingTable(passes, self._single)
-        gait = StandingGait.of(passes.parameters, passes.options)
+        gait = standing_gait(passes)
         duration = STEP_DURATION * passes.scale.time
         self.gait: Gait = replace(gait, stride=stride, step_duration=duration)
 

@@ -6,14 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Protocol
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
 
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Positive, Shape, Triple
+from template_control.checks.ranges import Positive, Shape, Triple, Vector
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.hybrid import Automaton
@@ -25,7 +25,7 @@ from template_control.slip.automaton.vocabulary import (
     StrideKind,
     WalkingStride,
 )
-from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
+from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, section_of
 from template_control.slip.parameters import SlipParameters
@@ -42,58 +42,44 @@ _SCAN = 120
 _LEVEL, _HEIGHT = 0, 1  # places in what a stride misses
 
 
-class Gait(Protocol):
-    """A stride that returns to its state: what planners settle on, whatever its kind."""
-
-    @property
-    def name(self) -> str:
-        """Name of the gait for tables and records."""
-
-    @property
-    def parameters(self) -> SlipParameters:
-        """The template."""
-
-    @property
-    def stride(self) -> str:
-        """Kind of stride, a key of an automaton's ``starts``."""
-
-    @property
-    def state(self) -> Array:
-        """(n,) dx/dt, y and, at VLO, dy/dt at its section [m/s, m, m/s]."""
-
-    @property
-    def controls(self) -> Array:
-        """(NUM_SLOTS,) touchdown angle [rad] and stiffnesses [N/m] by Slot."""
-
-    @property
-    def step_length(self) -> float:
-        """Distance covered [m]."""
-
-    @property
-    def step_duration(self) -> float:
-        """Duration of the stride [s]."""
-
-
 @dataclass(frozen=True)
-class WalkingGait(Checked):
-    """A passive symmetric walking gait.
+class Gait(Checked):
+    """A stride that returns to its state: what planners settle on, whatever its kind.
 
     Attributes:
         name: for tables and records.
         parameters: the template.
-        vlo: (3,) dx/dt, y, dy/dt at VLO; dy/dt is 0 [m/s, m, m/s].
+        state: (n,) at its section: dx/dt, y and, at VLO, dy/dt [m/s, m, m/s].
         controls: (NUM_SLOTS,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
-        step_length: [m].
-        step_duration: [s].
-        stride: kind of its steps, from VLO to VLO: "w" as in the paper, "wp" with push-off.
+        step_length: distance covered [m].
+        step_duration: of the stride [s].
+        stride: its kind, a key of an automaton's ``starts``.
     """
 
     name: str
     parameters: SlipParameters
-    vlo: Triple
+    state: Vector
     controls: Annotated[Array, Shape((NUM_SLOTS,))]
     step_length: float
     step_duration: Positive
+    stride: str
+
+    @property
+    def mean_speed(self) -> float:
+        """Step length over step duration [m/s]."""
+        return self.step_length / self.step_duration
+
+
+@dataclass(frozen=True)
+class WalkingGait(Gait):
+    """A passive symmetric walking gait.
+
+    Attributes:
+        state: (3,) dx/dt, y, dy/dt at VLO; dy/dt is 0 [m/s, m, m/s].
+        stride: kind of its steps, from VLO to VLO: "w" as in the paper, "wp" with push-off.
+    """
+
+    state: Triple
     stride: WalkingStride = StrideKind.WALK
 
     def __repr__(self) -> str:
@@ -104,14 +90,9 @@ class WalkingGait(Checked):
         )
 
     @property
-    def state(self) -> Array:
-        """(3,) :attr:`vlo`."""
-        return self.vlo
-
-    @property
-    def mean_speed(self) -> float:
-        """Step length over step duration [m/s]."""
-        return self.step_length / self.step_duration
+    def vlo(self) -> Array:
+        """(3,) :attr:`state`."""
+        return self.state
 
     @property
     def energy(self) -> float:
@@ -318,10 +299,5 @@ def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
     stride = simulate_stride(
         gait.parameters, start, section.state(gait.state), gait.controls, automaton=automaton
     )
-    return flying(stride, automaton)
-
-
-def flying(stride: Stride, automaton: Automaton = AUTOMATON) -> float:
-    """Share of a completed stride's duration in which no foot is on the ground."""
     flies = [node.phase is Phase.F for node in automaton.nodes]
     return float(sum(row[1] for row in stride.meta if flies[int(row[2])]) / stride.duration)

@@ -11,12 +11,12 @@ from scipy.optimize import brentq
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
-from template_control.checks.ranges import Positive
+from template_control.checks.ranges import Pair, Positive
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import flying
+from template_control.slip.gaits.gait import Gait, flight_share
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
@@ -31,27 +31,15 @@ _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
 @dataclass(frozen=True)
-class RunningGait:
+class RunningGait(Gait):
     """A passive symmetric running gait.
 
     Attributes:
-        name: for tables and records.
-        parameters: the template.
-        apex: (2,) dx/dt and y at apex [m/s, m].
-        controls: (NUM_SLOTS,) touchdown angle [rad] and stiffnesses [N/m] by Slot.
-        step_length: [m].
-        step_duration: from apex to apex [s].
-        flight_share: of the duration, without a foot on the ground.
+        state: (2,) dx/dt and y at apex [m/s, m].
         stride: its kind, from apex to apex: a run, or a hop.
     """
 
-    name: str
-    parameters: SlipParameters
-    apex: Array
-    controls: Array
-    step_length: float
-    step_duration: float
-    flight_share: float
+    state: Pair
     stride: str = StrideKind.RUN
 
     def __repr__(self) -> str:
@@ -62,14 +50,14 @@ class RunningGait:
         )
 
     @property
-    def state(self) -> Array:
-        """(2,) :attr:`apex`."""
-        return self.apex
+    def apex(self) -> Array:
+        """(2,) :attr:`state`."""
+        return self.state
 
     @property
-    def mean_speed(self) -> float:
-        """Step length over step duration [m/s]."""
-        return self.step_length / self.step_duration
+    def flight_share(self) -> float:
+        """Share of the duration without a foot on the ground."""
+        return flight_share(self)
 
 
 @checked
@@ -154,8 +142,7 @@ def running_gait(
         )
     u = controls(angle if speed >= 0.0 else np.pi - angle, leg_stiffness, leg_stiffness)
     path = simulate_stride(p, STRIDE_START[stride], APEX.state(z), u)
-    length, kind = float(path.state[0]), StrideKind(stride)
-    return RunningGait(name, p, z, u, length, path.duration, flying(path), stride=kind)
+    return RunningGait(name, p, z, u, float(path.state[0]), path.duration, StrideKind(stride))
 
 
 def _symmetric_angle(

@@ -97,5 +97,5 @@ def _found(gait: WalkingGait, slope: float, x: Array) -> WalkingGait:
     step = simulate_stride(own, STRIDE_START[gait.stride], VLO.state(z), u)
     length = float(step.state[0])
     return replace(
-        gait, parameters=own, vlo=z, controls=u, step_length=length, step_duration=step.duration
+        gait, parameters=own, state=z, controls=u, step_length=length, step_duration=step.duration
     )
