@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from scipy.stats import binned_statistic
 
 from template_control.arrays import Array, BoolArray
 from template_control.paper.reproduction import Reproduction
@@ -236,33 +236,26 @@ def table3() -> Reproduction:
     )
 
 
-def _binned(errors: Array, bins: NDArray[np.signedinteger], count: int) -> Array:
-    """Mean of ``errors`` in each bin; NaN in an empty one."""
-    return np.array(
-        [np.nanmean(errors[bins == b]) if np.any(bins == b) else np.nan for b in range(count)]
-    )
-
-
 def fig5() -> Reproduction:
     """Fig. 5: errors of the maps binned over d_v."""
     grid = Grid()
     result = study(grid)
-    bins = np.digitize(result.distance, _BINS) - 1
-    count = len(_BINS) - 1
-    counts = np.array([np.sum(bins == b) for b in range(count)])
-    means: dict[str, tuple[Array, Array]] = {}
-    for kind, errors in result.errors.items():
-        means[_NAMES[kind]] = (
-            _binned(errors.position, bins, count),
-            _binned(errors.velocity, bins, count),
-        )
+    counts, _ = np.histogram(result.distance, _BINS)
+
+    def binned(errors: Array) -> Array:
+        return np.asarray(binned_statistic(result.distance, errors, np.nanmean, _BINS).statistic)
+
+    means = {
+        _NAMES[kind]: (binned(errors.position), binned(errors.velocity))
+        for kind, errors in result.errors.items()
+    }
     rows = [
         (
             f"{_BINS[b]:.2f} to {_BINS[b + 1]:.2f}",
             f"{counts[b]}",
             *(f"{values[panel][b]:.3g}" for panel in range(2) for values in means.values()),
         )
-        for b in range(count)
+        for b in range(len(counts))
     ]
     return Reproduction(
         title="Fig. 5: error against the distance d_v between two returns",

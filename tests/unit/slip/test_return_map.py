@@ -295,7 +295,7 @@ def test_nan_and_wrong_shapes_do_not_enter():
     u = STRIDES["w"][1]
     with pytest.raises(ParameterError, match="state holds a number that is not finite"):
         step([1.1, np.nan, 0.0], u)
-    with pytest.raises(ParameterError, match="controls is .* give finite"):
+    with pytest.raises(ParameterError, match=r"controls is .* give finite"):
         step.linearise([1.1, 0.98, 0.0], u + np.inf)
     with pytest.raises(ParameterError, match="last axis must hold 3"):
         step([1.1, 0.98], u)
