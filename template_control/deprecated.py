@@ -29,7 +29,7 @@ DEPRECATED = {
     "template_control.robot.free_state_in": "template_control.robot:floating_state_in",
     "template_control.robot.FreeBiped": "template_control.robot:FloatingBaseBiped",
     "template_control.robot.FreeFiveLink": "template_control.robot:FloatingBaseFiveLink",
-    "template_control.robot.FreePose": "template_control.robot:FloatingBasePose",
+    "template_control.robot.FreePose": "template_control.robot:Pose",
     "template_control.robot.load_free_robot": "template_control.robot:load_floating_robot",
     "template_control.robustness.ASIDE": "template_control.robustness:LATERAL_PUSHES",
     "template_control.robustness.Conditions": "template_control.robustness:CampaignConfig",

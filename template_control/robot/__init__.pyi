@@ -17,6 +17,6 @@ from .robot import FrameTerms as FrameTerms
 from .robot import Robot as Robot
 from .sole import Sole as Sole
 from .spec import RobotSpec as RobotSpec
-from .start import FloatingBasePose as FloatingBasePose
+from .start import Pose as Pose
 from .start import floating_state_in as floating_state_in
 from .start import state_at_vlo as state_at_vlo

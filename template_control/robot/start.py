@@ -11,8 +11,8 @@ import pinocchio as pin
 
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple
-from template_control.errors import RobotError
+from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple, Vector
+from template_control.errors import ParameterError, RobotError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.legs import foot_frame
@@ -26,63 +26,35 @@ _EXACT = 1e-12  # [m, rad]
 
 @dataclass(frozen=True)
 class Pose(Checked):
-    """Positions and velocities of the CoM and the feet, in the plane.
+    """Positions and velocities of the CoM and the feet; x and y up, or in space x, y and z up.
+
+    In space they are in the heading frame.
 
     Attributes:
-        com, com_velocity: (2,) of the CoM [m, m/s].
-        feet: (2, 2) lowest points of rear and front foot [m].
-        feet_velocity: (2, 2) [m/s].
+        com, com_velocity: (d,) of the CoM [m, m/s], d the robot's directions.
+        feet: (2, d) lowest points of rear and front foot [m]; of several contacts the mean, from
+            which they are as far as where the legs hang down. Of flat feet the toes of level soles.
+        feet_velocity: (2, d) [m/s].
         rear: the foot that is the rear leg's.
         swung: time since rear and front foot left the ground [s]; None: they are in the middle of
             their swings, if they swing.
         pitch: of the trunk [rad].
-        angular_momentum: about the CoM [N m s]; the trunk turns so that the robot has it. None: the
-            trunk is at rest.
-        momentum_speed: dx/dt of the CoM is meant to include the angular momentum about the CoM: it
-            is the momentum about the foot below, over m y.
+        angular_momentum: forward, about the CoM [N m s]; the trunk turns so that the robot has it.
+            None: the trunk is at rest.
+        momentum_speed: whether ``com_velocity`` is meant to include the angular momentum about the
+            CoM, as if it moved the CoM: times m and the CoM's height it is the momentum about the
+            point on the ground below. With flat feet the lateral one is ``sway`` times that.
     """
 
-    com: Pair
-    com_velocity: Pair
-    feet: Annotated[Array, Shape((2, 2))]
-    feet_velocity: Annotated[Array, Shape((2, 2))]
+    com: Vector
+    com_velocity: Vector
+    feet: Annotated[Array, Shape((2, None))]
+    feet_velocity: Annotated[Array, Shape((2, None))]
     rear: Annotated[int, Range(0, 1)] = 0
     swung: tuple[NotNegative, NotNegative] | None = None
     pitch: float = 0.0
     angular_momentum: float | None = None
     momentum_speed: bool = False
-
-
-@dataclass(frozen=True)
-class FloatingBasePose(Checked):
-    """Positions and velocities of the CoM and the feet; in the heading frame, trunk upright.
-
-    Attributes:
-        com: (3,) of the CoM [m].
-        com_velocity: (3,) m/s; with the angular momentum about the CoM, as if it moved the CoM: m z
-            times it is the momentum about the point on the ground below. With flat feet the lateral
-            one is ``sway`` times that.
-        feet: (2, 3) lowest points of rear and front foot [m]; of several contacts the mean, from
-            which they are as far as where the legs hang down. Of flat feet the toes of level
-            soles.
-        feet_velocity: (2, 3) [m/s].
-        rear: the foot that is the rear leg's.
-        pitch: of the trunk [rad].
-        swung: time since rear and front foot left the ground [s]; None: they are in the middle of
-            their swings, if they swing.
-        in_flight: whether the robot has no angular momentum about the CoM, so that the trunk
-            turns against the legs, and ``com_velocity`` is the CoM's alone. Else the trunk is at
-            rest.
-    """
-
-    com: Triple
-    com_velocity: Triple
-    feet: Annotated[Array, Shape((2, 3))]
-    feet_velocity: Annotated[Array, Shape((2, 3))]
-    rear: Annotated[int, Range(0, 1)] = 0
-    pitch: float = 0.0
-    swung: tuple[NotNegative, NotNegative] | None = None
-    in_flight: bool = False
 
 
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
@@ -96,7 +68,7 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
         robot,
         lambda q, longest: _configuration(robot, pose, q, longest),
         (np.inf, _SHORT),
-        pose.com[1],
+        pose,
     )
     robot.update(q, np.zeros(robot.nv))
     return q, _velocity(robot, pose, q)
@@ -140,7 +112,7 @@ def state_at_vlo(
 
 
 @checked
-def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple[Array, Array]:
+def floating_state_in(robot: FloatingBaseBiped, pose: Pose) -> tuple[Array, Array]:
     """State of a floating-base robot whose CoM and feet are in a pose.
 
     Args:
@@ -154,20 +126,18 @@ def floating_state_in(robot: FloatingBaseBiped, pose: FloatingBasePose) -> tuple
         RobotError: if the legs do not reach, or joints would be beyond their limits.
     """
     robot.face(0.0, np.zeros(2))
-    q = _bent_to(
-        robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose.com[2]
-    )
+    q = _bent_to(robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose)
     robot.update(q, np.zeros(robot.nv))
     rows, momentum = robot.placing_rows(), robot.jacobians.momentum
     weight = robot.mass * pose.com[2]
-    if pose.in_flight:
+    if pose.angular_momentum is not None:
         rows[3:6] = momentum
-    else:
+    if pose.momentum_speed:
         rows[0] += momentum[1] / weight
         rows[1] -= momentum[0] / weight
         rows[1] *= robot.sway
     wanted, velocities = np.zeros(len(rows)), np.zeros((len(robot.feet), robot.contact_rows))
-    wanted[:3] = pose.com_velocity
+    wanted[:3], wanted[4] = pose.com_velocity, pose.angular_momentum or 0.0
     velocities[:, :3] = _by_contact(robot, pose, pose.feet_velocity)
     wanted[6:] = velocities.ravel()
     v = robot.smallest_motion(rows, wanted)
@@ -179,14 +149,21 @@ def _bent_to(
     robot: Biped,
     solve: Callable[[Array, float], Array | None],
     longest: Sequence[float],
-    height: float,
+    pose: Pose,
 ) -> Array:
     """(nq,) configuration of a pose, with knees bent as their ranges allow.
 
     ``solve`` finds the pose from a configuration with bent legs by steps of a largest length [rad,
-    m], or None; ``longest`` are the lengths to try, ``height`` is of the CoM, for the message.
+    m], or None; ``longest`` are the lengths to try. A ParameterError if the pose has not as many
+    directions as the robot.
     """
-    beyond = ""
+    places = pose.com, pose.com_velocity, pose.feet, pose.feet_velocity
+    if any(place.shape[-1] != robot.directions for place in places):
+        raise ParameterError(
+            f"the pose of {robot.name} has places of {len(pose.com)} numbers, or velocities of"
+            f" others: give {robot.directions} each"
+        )
+    beyond, height = "", pose.com[-1]
     low, high = robot.joint_range.T
     for backward in (False, True):
         for length in longest:
@@ -286,9 +263,7 @@ def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
     return v
 
 
-def _floating_configuration(
-    robot: FloatingBaseBiped, pose: FloatingBasePose, q: Array
-) -> Array | None:
+def _floating_configuration(robot: FloatingBaseBiped, pose: Pose, q: Array) -> Array | None:
     """As :func:`_configuration`, of a floating-base robot."""
     q[:3] = pose.com[0], pose.com[1], 0.9 * pose.com[2]
     upright = pin.rpy.rpyToMatrix(0.0, pose.pitch, 0.0)
@@ -315,7 +290,7 @@ def _floating_configuration(
     return _newton(robot, q, error, step, _LONGEST, 100)
 
 
-def _by_contact(robot: FloatingBaseBiped, pose: FloatingBasePose, values: Array) -> Array:
+def _by_contact(robot: FloatingBaseBiped, pose: Pose, values: Array) -> Array:
     """(n, 3) of each contact what rear and front foot have, ``values`` (2, 3)."""
     found = np.empty((len(robot.feet), 3))
     for leg, value in zip((pose.rear, 1 - pose.rear), values, strict=True):

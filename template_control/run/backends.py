@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from math import atan2, cos, degrees, sin
 
 import numpy as np
@@ -25,7 +26,6 @@ from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import (
-    FloatingBasePose,
     Pose,
     floating_state_in,
     state_at_vlo,
@@ -143,7 +143,7 @@ def _imu(
 _REAR = 0  # the left foot stands where a run begins
 
 
-def _stand(z: Array, width: float, apart: float) -> FloatingBasePose:
+def _stand(z: Array, width: float, apart: float) -> Pose:
     """At rest on both feet, ``width`` [m] apart to the side; ``z`` (3,) is at rest.
 
     The front one is ``apart`` [m] ahead.
@@ -151,13 +151,8 @@ def _stand(z: Array, width: float, apart: float) -> FloatingBasePose:
     feet = np.zeros((2, 3))
     feet[:, 0] = apart * np.array([-0.5, 0.5])
     feet[:, 1] = 0.5 * width * np.array(SIDES)
-    return FloatingBasePose(
-        com=np.array([0.0, 0.0, z[1]]),
-        com_velocity=np.zeros(3),
-        feet=feet,
-        feet_velocity=np.zeros((2, 3)),
-        rear=_REAR,
-    )
+    com = np.array([0.0, 0.0, z[1]])
+    return Pose(com, np.zeros(3), feet, np.zeros((2, 3)), _REAR, momentum_speed=True)
 
 
 class FloatingBackend(RobotBackend):
@@ -210,7 +205,7 @@ class FloatingBackend(RobotBackend):
             return q, v
         away, drift = lateral.cycle.states[SIDES[_REAR].row]
         # Mid-swing: the other foot passes the stance foot at twice the CoM's speed.
-        pose = FloatingBasePose(
+        pose = Pose(
             com=np.array([0.0, 0.5 * width + away, z[1]]),
             com_velocity=np.array([z[0], drift, z[2]]),
             feet=np.array(
@@ -219,12 +214,13 @@ class FloatingBackend(RobotBackend):
             feet_velocity=np.array([[0.0, 0.0, 0.0], [2.0 * z[0], 0.0, 0.0]]),
             rear=_REAR,
             pitch=controller.first_pitch(),
+            momentum_speed=True,
         )
         q, v = floating_state_in(self.robot, pose)
         controller.start(_REAR, first=first)
         return q, v
 
-    def _apex_pose(self, lateral: LateralPlanner, start: ApexStart) -> FloatingBasePose:
+    def _apex_pose(self, lateral: LateralPlanner, start: ApexStart) -> Pose:
         """The pose at an apex: the planar one, in the gait's lateral motion.
 
         The front leg's foot has stood last, and the rear leg's is about to land.
@@ -234,19 +230,16 @@ class FloatingBackend(RobotBackend):
         foothold = -0.5 * lateral.cycle.steps[stood.row]
         y = [foothold + lateral.cycle.steps[stood.row], foothold]
 
-        def lifted(pose: Pose) -> FloatingBasePose:
+        def lifted(pose: Pose) -> Pose:
             def in_space(points: Array, y: ArrayLike) -> Array:
                 return np.insert(points, 1, y, axis=-1)
 
-            return FloatingBasePose(
+            return replace(
+                pose,
                 com=in_space(pose.com, foothold + away),
                 com_velocity=in_space(pose.com_velocity, drift),
                 feet=in_space(pose.feet, y),
                 feet_velocity=in_space(pose.feet_velocity, 0.0),
-                rear=_REAR,
-                pitch=pose.pitch,
-                swung=pose.swung,
-                in_flight=True,
             )
 
         return lifted(

@@ -15,9 +15,9 @@ from template_control.plant.mujoco import MujocoOptions
 from template_control.robot import (
     FloatingBaseBiped,
     FloatingBaseFiveLink,
-    FloatingBasePose,
     HipBlock,
     JointLimits,
+    Pose,
     SolidLink,
     floating_state_in,
     load_floating_robot,
@@ -181,7 +181,9 @@ def edited(old, new):
 
 def start(robot, height=0.98):
     feet = np.array([[0.0, 0.1, 0.0], [0.0, -0.1, 0.05]])
-    pose = FloatingBasePose(np.array([0.0, 0.0, height]), np.zeros(3), feet, np.zeros((2, 3)))
+    pose = Pose(
+        np.array([0.0, 0.0, height]), np.zeros(3), feet, np.zeros((2, 3)), momentum_speed=True
+    )
     floating_state_in(robot, pose)
 
 
@@ -296,11 +298,12 @@ def test_legs_of_four_hinges_walk(load, text, above, plant):
 def test_the_start_of_a_leg_of_four_hinges_moves_its_feet_as_wanted(load, text):
     robot = load(with_yaw(text, above=True))
     velocity = np.array([[0.0, 0.0, 0.0], [2.0, 0.1, -0.2]])
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array([0.0, 0.02, 0.96]),
         com_velocity=np.array([1.1, 0.1, 0.0]),
         feet=np.array([[0.0, 0.1, 0.0], [0.1, -0.12, 0.05]]),
         feet_velocity=velocity,
+        momentum_speed=True,
     )
     q, v = floating_state_in(robot, pose)
     robot.update(q, v)

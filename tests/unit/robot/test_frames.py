@@ -15,7 +15,7 @@ from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.robot.start import FloatingBasePose, floating_state_in, state_at_vlo
+from template_control.robot.start import Pose, floating_state_in, state_at_vlo
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 
@@ -128,13 +128,14 @@ def test_a_planar_robot_in_other_words_is_the_same(seed, tmp_path):
 def test_a_free_robot_in_other_words_is_the_same(seed, tmp_path):
     words = Words(FloatingBaseBiped, robot_path("five-link-3d"), seed, tmp_path)
     assert_same_model(words, np.random.default_rng(seed))
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array([0.0, 0.05, 0.97]),
         com_velocity=np.array([1.0, 0.1, 0.0]),
         feet=np.array([[0.0, -0.1, 0.0], [0.1, 0.1, 0.04]]),
         feet_velocity=np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.1]]),
         rear=1,
         pitch=0.05,
+        momentum_speed=True,
     )
     (q, v), (other_q, other_v) = (floating_state_in(r, pose) for r in (words.own, words.other))
     np.testing.assert_allclose(other_q, words.q(q), atol=SAME)

@@ -11,7 +11,7 @@ from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions,
 from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
 from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
-from template_control.robot.start import FloatingBasePose, floating_state_in
+from template_control.robot.start import Pose, floating_state_in
 
 
 @pytest.fixture(scope="module")
@@ -178,12 +178,13 @@ def test_roll_pitch_and_yaw_are_those_of_the_heading_frame(bolt):
 
 
 def test_a_start_is_in_the_pose(bolt):
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array([0.0, 0.01, 0.35]),
         com_velocity=np.array([0.6, -0.1, 0.02]),
         feet=np.array([[0.0, 0.05, 0.0], [0.02, -0.06, 0.02]]),
         feet_velocity=np.array([[0.0, 0.0, 0.0], [1.2, 0.1, 0.0]]),
         rear=1,
+        momentum_speed=True,
     )
     q, v = floating_state_in(bolt, pose)
     bolt.update(q, v)
@@ -197,6 +198,8 @@ def test_a_start_is_in_the_pose(bolt):
     np.testing.assert_allclose(about, pose.com_velocity, atol=1e-11)
     with pytest.raises(RobotError, match="do not reach"):
         floating_state_in(bolt, replace(pose, com=np.array([0.0, 0.0, 0.8])))
+    with pytest.raises(ParameterError, match="give 3 each"):
+        floating_state_in(bolt, replace(pose, com=np.array([0.0, 0.3])))
 
 
 def test_the_limits_are_those_of_the_actuators(bolt):

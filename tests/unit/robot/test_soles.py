@@ -14,7 +14,7 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.sole import Sole
 from template_control.robot.spec import RobotSpec
-from template_control.robot.start import FloatingBasePose, floating_state_in
+from template_control.robot.start import Pose, floating_state_in
 
 G1_FEET = ("left_ankle_roll_link", "right_ankle_roll_link")
 SHAPE = '<collision><origin xyz="0.03 {y} -0.02"/><geometry><%s/></geometry></collision>'
@@ -59,12 +59,13 @@ def test_an_upper_body_that_moves_rests_where_it_would_be_locked(g1, whole):
     assert [angle for _, angle in whole.spare] == [0.0] * 17
     for name in ("mass", "leg_length", "ankle_height", "toe_ahead", "sway", "leg_mass"):
         assert getattr(whole, name) == pytest.approx(getattr(g1, name), rel=1e-9), name
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array([0.0, 0.05, 0.6]),
         com_velocity=np.array([0.5, 0.1, 0.0]),
         feet=np.array([[0.0, 0.07, 0.0], [0.2, -0.07, 0.0]]),
         feet_velocity=np.zeros((2, 3)),
         rear=0,
+        momentum_speed=True,
     )
     for ours, theirs in zip(
         floating_state_in(whole, pose), floating_state_in(g1, pose), strict=True
@@ -184,12 +185,13 @@ def test_the_sway_ratio_is_that_of_a_sway(g1):
 
 
 def test_a_start_puts_level_soles_on_the_ground(g1):
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array([0.02, 0.01, 0.62]),
         com_velocity=np.array([0.4, 0.1, 0.0]),
         feet=np.array([[0.0, 0.08, 0.0], [0.1, -0.08, 0.03]]),
         feet_velocity=np.array([[0.0, 0.0, 0.0], [0.8, 0.0, 0.1]]),
         pitch=0.05,
+        momentum_speed=True,
     )
     floating_state_in(g1, pose)
     now, s = g1.data[0], g1.space

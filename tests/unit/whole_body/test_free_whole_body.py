@@ -9,7 +9,7 @@ import pytest
 from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot, load_robot
-from template_control.robot.start import FloatingBasePose, floating_state_in
+from template_control.robot.start import Pose, floating_state_in
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
 from template_control.whole_body.stack import TaskStack
@@ -44,11 +44,12 @@ def bolt():
 
 def standing(robot, rng):
     """A state near standing, with the feet apart."""
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array([0.06, 0.0, 0.34]) + rng.normal(0.0, 0.005, 3),
         com_velocity=rng.normal(0.0, 0.1, 3),
         feet=np.array([[0.0, 0.05, 0.0], [0.12, -0.05, 0.0]]),
         feet_velocity=rng.normal(0.0, 0.05, (2, 3)),
+        momentum_speed=True,
     )
     return floating_state_in(robot, pose)
 

@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot
-from template_control.robot.start import FloatingBasePose, floating_state_in
+from template_control.robot.start import Pose, floating_state_in
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.problem import CONE, patch_cone
 from template_control.whole_body.solver import SOLE_SHARE, QpOptions, Stance, WholeBodyQp
@@ -65,11 +65,12 @@ def test_the_cone_holds_no_other_wrench():
 
 
 def standing(robot, com, width=0.16, ahead=0.1):
-    pose = FloatingBasePose(
+    pose = Pose(
         com=np.array(com),
         com_velocity=SPEED,
         feet=np.array([[0.0, 0.5 * width, 0.0], [ahead, -0.5 * width, 0.0]]),
         feet_velocity=np.zeros((2, 3)),
+        momentum_speed=True,
     )
     return floating_state_in(robot, pose)
 

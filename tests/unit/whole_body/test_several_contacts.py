@@ -6,7 +6,7 @@ import pytest
 
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import load_floating_robot, robot_path
-from template_control.robot.start import FloatingBasePose, floating_state_in
+from template_control.robot.start import Pose, floating_state_in
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.whole_body.solver import QpOptions, Stance, WholeBodyQp
 from template_control.whole_body.stack import TaskStack
@@ -14,11 +14,12 @@ from template_control.whole_body.task import WEIGHT, References
 from template_control.whole_body.tasks import ComTask, FootTask, OrientationTask, SideFootTask
 
 FEET = ("FL_foot", "FR_foot", "RL_foot", "RR_foot")
-STANDING = FloatingBasePose(
+STANDING = Pose(
     com=np.array([0.0, 0.0, 0.3]),
     com_velocity=np.array([0.3, -0.1, 0.05]),
     feet=np.zeros((2, 3)),
     feet_velocity=np.zeros((2, 3)),
+    momentum_speed=True,
 )
 
 
