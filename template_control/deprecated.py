@@ -28,7 +28,6 @@ DEPRECATED = {
     "template_control.robot.FREE_ROBOTS": "template_control.robot:FLOATING_ROBOTS",
     "template_control.robot.free_state_in": "template_control.robot:floating_state_in",
     "template_control.robot.FreeBiped": "template_control.robot:FloatingBaseBiped",
-    "template_control.robot.FreeFiveLink": "template_control.robot:FloatingBaseFiveLink",
     "template_control.robot.FreePose": "template_control.robot:Pose",
     "template_control.robot.load_free_robot": "template_control.robot:load_floating_robot",
     "template_control.robustness.ASIDE": "template_control.robustness:LATERAL_PUSHES",

@@ -11,10 +11,8 @@ import template_control as tc
 from template_control import embedding, estimation, run, slip, sweep, whole_body
 from template_control.plant import BulletPlant, IdealPlant, MujocoPlant
 from template_control.robot import (
-    FloatingBaseFiveLink,
     HipBlock,
     JointLimits,
-    SolidLink,
     state_at_vlo,
 )
 from template_control.robustness import measure, trial
@@ -27,7 +25,6 @@ GAIT = tc.default_gait(ROBOT)
 Z = GAIT.vlo
 U = GAIT.controls
 LINK = tc.Link(0.4, 3.0, 0.2, 0.1)
-PLANAR = tc.FiveLink("mine", LINK, LINK, LINK, (9.0, 9.0))
 SEGMENT = slip.Segment("walk", speed=1.1, steps=1)
 SCENARIO = slip.Scenario((SEGMENT,))
 MAP = tc.ReturnMap(P)
@@ -133,11 +130,7 @@ def targets(folder):
         tc.FiveLink: {
             "name": "mine", "trunk": LINK, "thigh": LINK, "shank": LINK, "torque_limit": (9.0, 9.0)
         },
-        SolidLink: {
-            "length": 0.4, "mass": 3.0, "com": 0.2, "inertia": 0.1, "side_inertia": (0.1, 0.1)
-        },
         HipBlock: {"mass": 1.0, "radius": 0.05, "torque_limit": 9.0},
-        FloatingBaseFiveLink: {"planar": PLANAR, "block": HipBlock(1.0, 0.05, 9.0)},
         JointLimits: {"torque": 9.0, "velocity": 9.0},
         embedding.PhaseControl: {"tasks": (whole_body.PostureTask(),)},
         embedding.Decision: {

@@ -1,9 +1,7 @@
 from .biped import Biped as Biped
 from .five_link import FiveLink as FiveLink
-from .five_link import FloatingBaseFiveLink as FloatingBaseFiveLink
 from .five_link import HipBlock as HipBlock
 from .five_link import Link as Link
-from .five_link import SolidLink as SolidLink
 from .floating_biped import FloatingBaseBiped as FloatingBaseBiped
 from .floating_biped import JointLimits as JointLimits
 from .library import FLOATING_ROBOTS as FLOATING_ROBOTS

@@ -14,11 +14,10 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot import (
     FloatingBaseBiped,
-    FloatingBaseFiveLink,
     HipBlock,
     JointLimits,
+    Link,
     Pose,
-    SolidLink,
     floating_state_in,
     load_floating_robot,
     robot_path,
@@ -62,9 +61,9 @@ def table():
 
     def solid(length, mass, com, moments):
         about_y, others = moments
-        return SolidLink(length, mass, com, about_y, others)
+        return Link(length, mass, com, about_y, others)
 
-    planar = tc.FiveLink(
+    return tc.FiveLink(
         "five_link_3d",
         trunk=solid(0.65, 61.6, 0.3461, box(61.6, 0.25, 0.45, 0.65)),
         thigh=solid(0.45, 4.8, 0.225, rod(4.8, 0.05, 0.45)),
@@ -73,9 +72,7 @@ def table():
         velocity_limit=20.0,
         hip_range=(-2.0, 1.5),
         knee_range=(0.0, 2.5),
-    )
-    return FloatingBaseFiveLink(
-        planar, HipBlock(2.0, 0.06, torque_limit=200.0, velocity_limit=23.0)
+        block=HipBlock(2.0, 0.06, torque_limit=200.0, velocity_limit=23.0),
     )
 
 
@@ -127,8 +124,8 @@ def test_a_hip_block_of_no_body_is_refused(name, value):
 
 @pytest.mark.parametrize("moments", [(0.0, 0.1), (0.1, -0.1), (np.nan, 0.1), (0.1,), 0.1])
 def test_moments_that_no_body_has_are_refused(moments):
-    with pytest.raises(RobotError, match=r"SolidLink\.side_inertia"):
-        SolidLink(0.4, 3.0, 0.2, 0.1, moments)
+    with pytest.raises(RobotError, match=r"Link\.side_inertia"):
+        Link(0.4, 3.0, 0.2, 0.1, moments)
 
 
 def test_moments_that_break_the_triangle_are_refused_where_they_are_loaded(load):

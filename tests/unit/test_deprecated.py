@@ -26,7 +26,6 @@ OLD_NAMES = {
     "template_control.robot.FREE_ROBOTS",
     "template_control.robot.free_state_in",
     "template_control.robot.FreeBiped",
-    "template_control.robot.FreeFiveLink",
     "template_control.robot.FreePose",
     "template_control.robot.load_free_robot",
     "template_control.robustness.ASIDE",

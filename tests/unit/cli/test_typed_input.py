@@ -18,7 +18,6 @@ from template_control.cli.main import _COMMANDS, build_parser
 from template_control.errors import GaitError, ParameterError, RecordError, RobotError
 from template_control.plant.terrain import Terrain
 from template_control.plant.terrain_spec import KINDS, terrain_from
-from template_control.robot.five_link import SolidLink
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robustness.campaign import DisturbanceDistribution
 from template_control.run.experiment import Experiment
@@ -319,11 +318,9 @@ def test_advised_speeds_are_had():
 
 
 def test_a_centre_of_mass_outside_its_link_is_refused():
-    for made in (tc.Link, SolidLink):
-        more = () if made is tc.Link else ((0.1, 0.1),)
-        made(1.0, 2.0, 1.0, 0.1, *more)
-        with pytest.raises(RobotError, match=r"com is 5 m, outside a link of 1 m"):
-            made(1.0, 2.0, 5.0, 0.1, *more)
+    tc.Link(1.0, 2.0, 1.0, 0.1)
+    with pytest.raises(RobotError, match=r"com is 5 m, outside a link of 1 m"):
+        tc.Link(1.0, 2.0, 5.0, 0.1)
 
 
 def test_feet_larger_than_the_legs_are_refused(tmp_path):
