@@ -37,7 +37,6 @@ DEPRECATED = {
     "template_control.robustness.FREE_MIX": "template_control.robustness:FLOATING_MIX",
     "template_control.robustness.Mix": "template_control.robustness:DisturbanceDistribution",
     "template_control.RunInterrupted": "template_control.run:RunInterrupted",
-    "template_control.SpeedCommand": "template_control.slip:SpeedCommand",
     "template_control.run.Course": "template_control.run:HeadingCommand",
     "template_control.run.FreeRecord": "template_control.run:FloatingRecord",
     "template_control.run.GaitChoice": "template_control.run:GaitSpec",

@@ -74,7 +74,6 @@ from .maps.section import VLO as VLO
 from .maps.section import Section as Section
 from .parameters import SlipParameters as SlipParameters
 from .scenario.route import Route as Route
-from .scenario.route import SpeedCommand as SpeedCommand
 from .scenario.route import SpeedProfile as SpeedProfile
 from .scenario.route import SteadyRoute as SteadyRoute
 from .scenario.route import StrideGoal as StrideGoal

@@ -35,7 +35,6 @@ OLD_NAMES = {
     "template_control.robustness.FREE_MIX",
     "template_control.robustness.Mix",
     "template_control.RunInterrupted",
-    "template_control.SpeedCommand",
     "template_control.run.Course",
     "template_control.run.FreeRecord",
     "template_control.run.GaitChoice",

@@ -15,7 +15,6 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
-from template_control.checks.fitting import check
 from template_control.checks.ranges import SpeedOrRest
 from template_control.errors import ParameterError, ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -193,37 +192,6 @@ class SpeedProfile(Checked):
     def __call__(self, time: float) -> float:
         """The speed wanted at ``time`` [s]."""
         return float(np.interp(time, self.times, self.speeds))
-
-
-class SpeedCommand:
-    """A speed that may be set at any time; called with a time, it gives the present one.
-
-    A route asks at each section. So what is set holds from the next VLO on.
-
-    Args:
-        speed: mean forward speed wanted first [m/s].
-    """
-
-    def __init__(self, speed: float) -> None:
-        self.speed = speed
-
-    @property
-    def speed(self) -> float:
-        """Mean forward speed that is wanted [m/s].
-
-        Raises:
-            ScenarioError: where it is set to no speed of a walk or a run.
-        """
-        return self._speed
-
-    @speed.setter
-    def speed(self, value: float) -> None:
-        """Want ``value`` [m/s] from now on."""
-        self._speed = float(check("the commanded speed", value, SpeedOrRest, ScenarioError))
-
-    def __call__(self, time: float) -> float:
-        """The present speed, whatever the ``time`` [s]."""
-        return self._speed
 
 
 SpeedAtTime = Callable[[float], float]

@@ -88,8 +88,7 @@ class SpeedRoute:
 
     Args:
         parameters: the template.
-        speed: a :class:`~.route.SpeedProfile`, a :class:`~.route.SpeedCommand`, or
-            any function of time.
+        speed: a :class:`~.route.SpeedProfile`, or any function of time.
         duration: when the route ends [s]; None: it does not.
         gaits: those that it may have; the walk always.
         changes: of the gait, for the reference template.

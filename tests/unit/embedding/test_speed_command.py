@@ -7,7 +7,7 @@ import template_control as tc
 from template_control.errors import ScenarioError
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.section import VLO
-from template_control.slip.scenario.route import SpeedCommand, SpeedProfile
+from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
 
 P = tc.SlipParameters()
@@ -34,15 +34,13 @@ def test_a_profile_that_is_none_is_refused(times, speeds, told):
         SpeedProfile(times, speeds)
 
 
-def test_a_command_holds_until_it_is_changed():
-    command = SpeedCommand(0.5)
-    route = SpeedRoute(P, command)
+def test_a_speed_holds_until_it_is_changed():
+    speeds = [0.5]
+    route = SpeedRoute(P, lambda time: speeds[-1])
     assert route.endless
     assert route.next(VLO, route.start, 0.0).wanted_speed == 0.5
-    command.speed = 0.9
+    speeds.append(0.9)
     assert route.ahead(VLO, route.start, 0.8).wanted_speed == 0.9
-    with pytest.raises(ScenarioError, match="from 0 to 20"):
-        command.speed = -1.0
 
 
 def test_a_route_aims_at_the_speed_that_is_wanted_when_the_step_is_over():
