@@ -167,7 +167,6 @@ def targets(folder):
         tc.gait_at: {"parameters": P, "touchdown_angle": 1.15, "vlo_speed": 1.1},
         tc.gait_for_speed: {"parameters": P, "mean_speed": 1.2},
         tc.gait_from_energy: {"parameters": P, "height": 0.9818, "energy": 826.0},
-        slip.mean_speed_range: {"parameters": P},
         slip.running_gait: {"parameters": P, "speed": 3.0},
         slip.running_speeds: {"parameters": P},
         slip.walking_gait: {"parameters": P, "vlo_speed": 1.1},

@@ -48,7 +48,6 @@ from .gaits.slope_gait import on_slope as on_slope
 from .gaits.walking_by_speed import SpeedFamily as SpeedFamily
 from .gaits.walking_by_speed import WalkingFamily as WalkingFamily
 from .gaits.walking_by_speed import gait_for_speed as gait_for_speed
-from .gaits.walking_by_speed import mean_speed_range as mean_speed_range
 from .gaits.walking_by_speed import walking_by_speed as walking_by_speed
 from .gaits.walking_by_speed import walking_gait as walking_gait
 from .lateral.gait import LateralCycle as LateralCycle

@@ -143,7 +143,7 @@ def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
     return linear.state_jacobian, linear.control_jacobian[:, slots] * units
 
 
-def _gait(name: str, parameters: SlipParameters, z: Array, u: Array) -> WalkingGait:
+def _gait(parameters: SlipParameters, z: Array, u: Array, name: str = "walk") -> WalkingGait:
     stride = simulate_stride(parameters, STRIDE_START[StrideKind.WALK], VLO.state(z), u)
     if not stride.completed or np.max(np.abs(VLO.of(stride.state) - z)) > 1e-6:
         raise GaitError(f"gait {name!r} does not return to its VLO state: {stride.outcome.reason}")
@@ -208,21 +208,18 @@ def _symmetric_roots(
 
 
 @checked
-def gait_at(
-    parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
-) -> WalkingGait:
+def gait_at(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> WalkingGait:
     """The symmetric gait with a given touchdown angle and speed at VLO.
 
     Args:
         parameters: the template; both legs have its stiffness k0.
         touchdown_angle: alpha, from the ground to the leg [rad].
         vlo_speed: dx/dt at VLO [m/s].
-        name: of the gait.
 
     Raises:
         GaitError: if there is none.
     """
-    gait = find_gait_at(parameters, touchdown_angle, vlo_speed, name)
+    gait = find_gait_at(parameters, touchdown_angle, vlo_speed)
     if gait is None:
         raise GaitError(
             f"no walking gait with touchdown angle {np.degrees(touchdown_angle):.2f} deg"
@@ -232,7 +229,7 @@ def gait_at(
 
 
 def find_gait_at(
-    parameters: SlipParameters, touchdown_angle: float, vlo_speed: float, name: str = "walk"
+    parameters: SlipParameters, touchdown_angle: float, vlo_speed: float
 ) -> WalkingGait | None:
     """Gait of :func:`gait_at`, or None if there is none.
 
@@ -243,7 +240,7 @@ def find_gait_at(
     u = controls(touchdown_angle, k0, k0)
     heights = np.linspace(l0 * np.sin(touchdown_angle) + 1e-5 * l0, l0 * (1 - 1e-5), _SCAN)
     roots = _symmetric_roots(parameters, lambda y: (np.array([vlo_speed, y, 0.0]), u), heights)
-    return _gait(name, parameters, *roots[0]) if roots else None
+    return _gait(parameters, *roots[0]) if roots else None
 
 
 def _nearest(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> str:
@@ -263,16 +260,13 @@ def _nearest(parameters: SlipParameters, touchdown_angle: float, vlo_speed: floa
 
 
 @checked
-def gait_from_energy(
-    parameters: SlipParameters, height: float, energy: float, name: str = "paper"
-) -> WalkingGait:
+def gait_from_energy(parameters: SlipParameters, height: float, energy: float) -> WalkingGait:
     """The symmetric gait with a given VLO height and energy, as in Section IV-D.
 
     Args:
         parameters: the template; both legs have its stiffness k0.
         height: y at VLO [m].
         energy: mechanical energy at VLO, the stance spring's included [J].
-        name: of the gait.
 
     Raises:
         GaitError: if there is none.
@@ -289,7 +283,7 @@ def gait_from_energy(
     )
     if not roots:
         raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
-    return _gait(name, parameters, *roots[-1])
+    return _gait(parameters, *roots[-1], name="paper")
 
 
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:

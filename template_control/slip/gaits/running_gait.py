@@ -101,7 +101,6 @@ def running_gait(
     speed: float,
     apex_height: Positive | None = None,
     leg_stiffness: Positive | None = None,
-    name: str = "run",
     *,
     stride: str = StrideKind.RUN,
 ) -> RunningGait:
@@ -113,7 +112,6 @@ def running_gait(
         apex_height: y at apex [m]; by default :func:`suited_height`'s.
         leg_stiffness: before and after the bottom [N/m]; by default
             :func:`suited_stiffness`'s.
-        name: of the gait.
         stride: of a run, or of a hop: that backward is the mirror image of the one forward.
 
     Raises:
@@ -142,7 +140,7 @@ def running_gait(
         )
     u = controls(angle if speed >= 0.0 else np.pi - angle, leg_stiffness, leg_stiffness)
     path = simulate_stride(p, STRIDE_START[stride], APEX.state(z), u)
-    return RunningGait(name, p, z, u, float(path.state[0]), path.duration, StrideKind(stride))
+    return RunningGait("run", p, z, u, float(path.state[0]), path.duration, StrideKind(stride))
 
 
 def _symmetric_angle(

@@ -331,26 +331,13 @@ class WalkingFamily:
 _VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
 
 
-@checked
-def mean_speed_range(
-    parameters: SlipParameters, touchdown_angle: float | None = None
-) -> tuple[float, float] | None:
-    """Slowest and fastest mean speed of :func:`gait_for_speed` [m/s], to a centimetre per second.
-
-    Args:
-        parameters: the template.
-        touchdown_angle: alpha of gaits with the template's stiffness k0 [rad]; None: the range of
-            the family by speed.
-
-    Returns:
-        Both speeds, or None if there is no gait at this angle.
-    """
-    if touchdown_angle is None:
-        return walking_by_speed().range(parameters)
-    unit = parameters.speed_unit
+def _mean_speeds(parameters: SlipParameters, touchdown_angle: float) -> tuple[float, float] | None:
+    """Slowest and fastest mean speed of gaits with an angle [m/s], to a centimetre per second."""
     ends = []
     for speeds in (_VLO_SPEEDS, _VLO_SPEEDS[::-1]):
-        means = (_mean_speed(parameters, touchdown_angle, unit * s) for s in speeds)
+        means = (
+            _mean_speed(parameters, touchdown_angle, parameters.speed_unit * s) for s in speeds
+        )
         ends.append(next((mean for mean in means if np.isfinite(mean)), np.nan))
     if not np.isfinite(ends).all():
         return None
@@ -365,10 +352,7 @@ def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: f
 
 @checked
 def gait_for_speed(
-    parameters: SlipParameters,
-    mean_speed: float,
-    name: str = "walk",
-    touchdown_angle: Angle | None = None,
+    parameters: SlipParameters, mean_speed: float, touchdown_angle: Angle | None = None
 ) -> WalkingGait:
     """The symmetric gait with a given mean forward speed.
 
@@ -379,7 +363,6 @@ def gait_for_speed(
     Args:
         parameters: the template.
         mean_speed: step length over step duration [m/s].
-        name: of the gait.
         touchdown_angle: alpha, from the ground to the leg [rad]; None: the family's.
 
     Raises:
@@ -389,7 +372,7 @@ def gait_for_speed(
     if not (np.isfinite(mean_speed) and mean_speed > 0.0):
         raise GaitError(f"speed is {mean_speed!r} m/s: give a positive number")
     if touchdown_angle is None:
-        return replace(walking_by_speed().gait_for(p, mean_speed), name=name)
+        return walking_by_speed().gait_for(p, mean_speed)
     angle = touchdown_angle
     unit = p.speed_unit
 
@@ -403,8 +386,8 @@ def gait_for_speed(
         if f_lo <= 0.0 <= f_hi:
             speed = root(surplus, (lo, hi), _XTOL, _RTOL)
             if speed is not None:
-                return gait_at(p, angle, speed, name)
-    found = mean_speed_range(p, angle)
+                return gait_at(p, angle, speed)
+    found = _mean_speeds(p, angle)
     at = f" and {np.degrees(angle):g} deg at touchdown"
     if found is not None and not found[0] <= mean_speed <= found[1]:
         hint = f"give one from {found[0]:.2f} to {found[1]:.2f} m/s"

@@ -9,7 +9,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
-from template_control.slip.gaits.walking_by_speed import mean_speed_range, speed_range, walking_gait
+from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
 
 P = tc.SlipParameters()
 
@@ -24,7 +24,7 @@ def told(parameters, speed):
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_mean_speed_in_the_told_range_has_a_gait(name):
     template = tc.template_for(tc.load_robot(name))
-    low, high = mean_speed_range(template)
+    low, high = walking_by_speed().range(template)
     assert {told(template, speed) for speed in (0.3 * low, high + 0.01)} == {(low, high)}
     speeds = np.linspace(low, high, 7)
     gaits = [tc.gait_for_speed(template, speed) for speed in speeds]
