@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
 
@@ -151,39 +151,26 @@ _SAMPLES = 40  # a stride
 _STRIDES = (StrideKind.WALK, StrideKind.WALK_TO_RUN, StrideKind.RUN, StrideKind.RUN_TO_WALK)
 
 
-@dataclass
-class _Log:
-    """Lists that become the record's arrays."""
+class _Made(NamedTuple):
+    """A stride that was made, and when it began [s]."""
 
-    rest_length: float
-    samples: list[Array] = field(default_factory=list)
-    footholds: list[tuple[float, float]] = field(default_factory=lambda: [(0.0, 0.0)])
-    sections: list[tuple[float, Array]] = field(default_factory=list)
-    goals: list[StrideGoal] = field(default_factory=list)
-    solutions: list[StepSolution] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
+    began: float
+    goal: StrideGoal
+    solution: StepSolution
+    solve_seconds: float
+    stride: Stride
 
-    def arrive(self, now: float, state: Array) -> None:
-        """Append a section; at apex, too, dy/dt is kept as it was found."""
-        self.sections.append((now, VLO.of(state)))
+    def samples(self) -> Array:
+        """(_SAMPLES, 10) time, state, node, toes, stiffnesses."""
+        times = np.linspace(0.0, self.stride.duration, _SAMPLES, endpoint=False)
+        state, meta = self.stride.sample(times)[:, :4], self.stride.meta[self.stride.rows(times)]
+        return np.column_stack((self.began + times, state, meta[:, [2, 3, 4, 5, 6]]))
 
-    def note(self, now: float, goal: StrideGoal, solution: StepSolution, stride: Stride) -> None:
-        """Append a stride that began at ``now``."""
-        times = np.linspace(0.0, stride.duration, _SAMPLES, endpoint=False)
-        row = stride.rows(times)
-        self.samples.append(
-            np.column_stack(
-                (now + times, stride.sample(times)[:, :4], stride.meta[row][:, [2, 3, 4, 5, 6]])
-            )
-        )
-        reach = self.rest_length * np.cos(solution.controls[Slot.TOUCHDOWN_ANGLE])
-        self.footholds += [
-            (now + e.time, float(e.state[0] + reach))
-            for e in stride.events
-            if e.event is Event.TOUCHDOWN
-        ]
-        self.goals.append(goal)
-        self.solutions.append(solution)
+    def footholds(self, rest_length: float) -> list[tuple[float, float]]:
+        """Time and x of each touchdown."""
+        reach = rest_length * np.cos(self.solution.controls[Slot.TOUCHDOWN_ANGLE])
+        landed = (e for e in self.stride.events if e.event is Event.TOUCHDOWN)
+        return [(self.began + e.time, float(e.state[0] + reach)) for e in landed]
 
 
 class _Controllers:
@@ -239,15 +226,17 @@ def simulate_scenario(
         raise ScenarioError("the template cannot stand: give the scenario a segment that walks")
     route, controllers = ScenarioRoute(moving), _Controllers(moving)
     simulator = StrideSimulator(moving.parameters)
-    log, now, failure = _Log(moving.parameters.rest_length), 0.0, ""
     section, state = route.section, route.section.state(route.start)
-    log.arrive(now, state)
+    made: list[_Made] = []
+    now, failure = 0.0, ""
+    # At an apex, too, dy/dt is kept as it was found.
+    sections = [(now, VLO.of(state))]
     while True:
         z = section.of(state)
         goal = route.next(section, z, now)
         if goal is None:
             break
-        if len(log.goals) == MOST_STRIDES:
+        if len(made) == MOST_STRIDES:
             failure = f"stopped in segment {goal.segment + 1}, after {MOST_STRIDES} strides"
             break
         begin = time.perf_counter()
@@ -255,32 +244,33 @@ def simulate_scenario(
             solution = controllers.solve(z, goal)
         except ValueError as error:
             raise ScenarioError(f"segment {goal.segment + 1} at {now:.2f} s: {error}") from None
-        log.seconds.append(time.perf_counter() - begin)
+        seconds = time.perf_counter() - begin
         toe = float(state[0])
         start = AUTOMATON.start(goal.stride).name
         stride = simulator.run(start, state, solution.controls, (toe, toe))
-        log.note(now, goal, solution, stride)
+        made.append(_Made(now, goal, solution, seconds, stride))
         route.took(stride.duration)
         now += stride.duration
         state = stride.state
-        log.arrive(now, state)
+        sections.append((now, VLO.of(state)))
         if progress is not None:
             progress(now)
         if not stride.completed:
-            failure = f"stride {len(log.goals)} ({goal.stride}): {stride.outcome.reason}"
+            failure = f"stride {len(made)} ({goal.stride}): {stride.outcome.reason}"
             break
         section = section_of(AUTOMATON.sections(start)[1])
-    return _record(moving, log, failure)
+    return _record(moving, made, sections, failure)
 
 
 def _padded(states: list[Array]) -> Array:
     """(S, 3) states at VLO or apex, where dy/dt is 0."""
-    return np.array([[*z, 0.0][:PADDED] for z in states]).reshape(len(states), PADDED)
+    return np.array([[*z, 0.0][:PADDED] for z in states])
 
 
-def _record(scenario: Scenario, log: _Log, failure: str) -> ScenarioRecord:
-    table = np.concatenate(log.samples) if log.samples else np.empty((0, 10))
-    count = len(log.goals)
+def _record(
+    scenario: Scenario, made: list[_Made], sections: list[tuple[float, Array]], failure: str
+) -> ScenarioRecord:
+    table, length = np.concatenate([m.samples() for m in made]), scenario.parameters.rest_length
     metadata = {
         "name": scenario.name,
         "map": scenario.map_kind.name.lower(),
@@ -298,16 +288,16 @@ def _record(scenario: Scenario, log: _Log, failure: str) -> ScenarioRecord:
         node=table[:, 5].astype(np.int64),
         toes=table[:, 6:8],
         stiffness=table[:, 8:10],
-        foothold=np.array(log.footholds),
-        stride=np.array([_STRIDES.index(goal.stride) for goal in log.goals], dtype=np.int64),
-        section_time=np.array([t for t, _ in log.sections]),
-        section_state=np.array([z for _, z in log.sections]),
-        wanted_speed=np.array([goal.wanted_speed for goal in log.goals]),
-        target=_padded([goal.target for goal in log.goals]),
-        predicted=_padded([s.predicted for s in log.solutions]),
-        controls=np.array([s.controls for s in log.solutions]).reshape(count, -1),
-        residual=np.array([s.residual for s in log.solutions]),
-        reached=np.array([s.reached for s in log.solutions], dtype=bool),
-        solve_seconds=np.array(log.seconds),
+        foothold=np.array([(0.0, 0.0), *(at for m in made for at in m.footholds(length))]),
+        stride=np.array([_STRIDES.index(m.goal.stride) for m in made]),
+        section_time=np.array([t for t, _ in sections]),
+        section_state=np.array([z for _, z in sections]),
+        wanted_speed=np.array([m.goal.wanted_speed for m in made]),
+        target=_padded([m.goal.target for m in made]),
+        predicted=_padded([m.solution.predicted for m in made]),
+        controls=np.array([m.solution.controls for m in made]),
+        residual=np.array([m.solution.residual for m in made]),
+        reached=np.array([m.solution.reached for m in made]),
+        solve_seconds=np.array([m.solve_seconds for m in made]),
         metadata=metadata,
     )
