@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.box import SIMPLE_HEAD
 
 from template_control import storage
+from template_control.arrays import Array
 from template_control.checks import option_types as values
 from template_control.checks import typed
 from template_control.checks.fitting import check
@@ -45,8 +45,6 @@ from template_control.storage import Files, writing
 from template_control.terminal import show, table
 from template_control.view.stability_figures import UNITS, branch_figure, speed_family_figure
 from template_control.view.style import save_figure
-
-Array = NDArray[np.float64]
 
 
 class _Defaults(NamedTuple):

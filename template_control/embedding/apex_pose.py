@@ -12,8 +12,8 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Pair
 from template_control.embedding.swing import FEET, SwingOptions, begin_swing, swing_step
@@ -27,8 +27,6 @@ from template_control.slip.automaton.vocabulary import Event, Reset
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import APEX
-
-Array = NDArray[np.float64]
 
 _NEAR = 0.9  # of l0: a distance from the CoM that any leg reaches
 _LEVEL = 1.0  # the same of a leg with a level sole: more bent, its ankle comes to its stop

@@ -14,15 +14,13 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.model import ORDER
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import VLO
-
-Array = NDArray[np.float64]
 
 _NEWTON = 12
 _X, _Y = np.int64(0), np.int64(1)  # Numba would compile once for each literal int

@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
 from template_control.robot.biped import SINGLE
 from template_control.robot.terms import LEGS, MOST_CONTACTS
 from template_control.slip.similarity import TIME, Scale, tuned
-
-Array = NDArray[np.float64]
 
 EARLY = 0.015
 """A touchdown is due from this long before its time on the path [s, of the reference template].
@@ -83,7 +81,7 @@ NO_FORCE: Array = np.zeros((0, 2))
 
 
 @compiled
-def update_contacts(c: Any, flags: NDArray[np.bool_], force: Array, dt: float) -> None:
+def update_contacts(c: Any, flags: BoolArray, force: Array, dt: float) -> None:
     """Take in the flags of a tick.
 
     A flag that says what the path expects of its foot is believed at once: a foot stands, is in the

@@ -14,8 +14,8 @@ from math import nan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
 from template_control.embedding.contacts import NO_FORCE, forget_contacts, set_contacts
 from template_control.embedding.free.course import Course
@@ -64,8 +64,6 @@ from template_control.structured import keep
 from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.task import References
-
-Array = NDArray[np.float64]
 
 
 class EmbeddingController:
@@ -249,7 +247,7 @@ class EmbeddingController:
         self,
         q: Array,
         v: Array,
-        contact: NDArray[np.bool_],
+        contact: BoolArray,
         dt: float,
         force: Array | None = None,
     ) -> Solution:
@@ -277,7 +275,7 @@ class EmbeddingController:
             feel_in_space(self._tick, robot.data, self.qp.data, force, robot.axes, dt)
         return solution
 
-    def _sense(self, contact: NDArray[np.bool_], force: Array | None, dt: float) -> bool:
+    def _sense(self, contact: BoolArray, force: Array | None, dt: float) -> bool:
         """Take in what was measured; whether there is anything to decide."""
         felt = NO_FORCE if force is None or self.lateral is not None else force
         if not self.frame.of_world:

@@ -14,15 +14,12 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import onward
-
-Array = NDArray[np.float64]
-
 
 # Footholds that the slope's estimate looks back to. More of them make it slower on a slope that
 # begins, and surer where each foothold is a little off.

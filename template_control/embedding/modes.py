@@ -19,6 +19,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Range
 from template_control.compiled import compiled, unfused
@@ -43,8 +44,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, tuned
 from template_control.structured import Number
 from template_control.whole_body.stack import TaskStack
-
-Array = NDArray[np.float64]
 
 PLACED = {Reset.PLACE_REAR: Leg.REAR, Reset.PLACE_FRONT: Leg.FRONT}
 """The leg that a reset puts on the ground."""

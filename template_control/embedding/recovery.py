@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
@@ -24,8 +24,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND_HEIGHT
 from template_control.slip.similarity import REFERENCE, SPEED, Scale, scaled, tuned
-
-Array = NDArray[np.float64]
 
 
 class Exit(NamedTuple):

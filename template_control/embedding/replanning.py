@@ -11,8 +11,8 @@ from math import asin, atan2, hypot, inf, isnan, pi
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.planners.planner import (
     Cause,
@@ -35,8 +35,6 @@ from template_control.slip.maps.section import REST, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, RATE_SQUARED, Scale
-
-Array = NDArray[np.float64]
 
 _NEWTON = 4
 _AT_ONCE = 2e-3  # [s] from its start: no path comes to an event at which it begins

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.fitting import asked, check, name_of, shown
 from template_control.checks.ranges import NotNegative, Range, Shape, Triple
@@ -33,8 +33,6 @@ from template_control.slip.maps.section import Section, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.slip.similarity import SPEED, TIME, Scale, tuned
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.planners.planner import Decision
 from template_control.embedding.swing import Feet
@@ -18,8 +18,6 @@ from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import StrideGoal
 from template_control.structured import Number
-
-Array = NDArray[np.float64]
 
 
 @compiled

@@ -11,8 +11,8 @@ from dataclasses import replace
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.fitting import answered_or_none
 from template_control.embedding.com_path import Landing, TemplatePath, join
 from template_control.embedding.free.catching import CatchingStep
@@ -36,9 +36,6 @@ from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
-
-Array = NDArray[np.float64]
-
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 _BARELY_BEYOND, _JUST_BEYOND = 1.002, 1.01

@@ -19,8 +19,8 @@ from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
@@ -29,8 +29,6 @@ from template_control.robot.terms import MOST_CONTACTS, UP, onward
 from template_control.slip.automaton.vocabulary import Reset
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, Scale, scaled, tuned
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
 from template_control.embedding.com_path import unload_cap
 from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
@@ -50,8 +50,6 @@ from template_control.robot.terms import LEGS, UP, onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.task_rows import write_rows
-
-Array = NDArray[np.float64]
 
 _F, _I = np.float64, np.int64
 
@@ -110,7 +108,7 @@ def sense(
     data: Any,
     references: Any,
     qp: Any,
-    contact: NDArray[np.bool_],
+    contact: BoolArray,
     force: Array,
     dt: float,
 ) -> int:

@@ -13,8 +13,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
@@ -28,8 +28,6 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
 from template_control.robot.urdf import link_masses
 from template_control.warm_up import ready
-
-Array = NDArray[np.float64]
 
 _CLOSE = 1e-6  # of the robot's mass
 _BASE = -1  # PyBullet's index of the base link

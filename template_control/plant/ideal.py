@@ -15,8 +15,8 @@ from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
 from template_control.errors import DivergedError
 from template_control.plant.agreement import check_damping, trunk_corners
@@ -24,8 +24,6 @@ from template_control.plant.rigid_contact import RollingFeet, pressing, solve
 from template_control.plant.world import OptionsPlant, WorldOptions
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import PLANAR_DOF
-
-Array = NDArray[np.float64]
 
 _DEPTH = 1e-8  # [m] a foot this deep in the ground has touched down
 _HALVINGS = 24  # of a time step, to locate an event in
@@ -252,7 +250,7 @@ class IdealPlant(OptionsPlant):
             for i in range(len(gaps))
         )
 
-    def _land(self, feet: NDArray[np.bool_]) -> None:
+    def _land(self, feet: BoolArray) -> None:
         """Plastic impact of ``feet`` (n,) with the ground; another one may be released."""
         landing = tuple(i for i in range(len(feet)) if feet[i] and i not in self.contacts)
         if not landing:

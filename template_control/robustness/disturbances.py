@@ -14,8 +14,8 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.plant import plant_name
@@ -53,9 +53,7 @@ def with_step(world: PlantOptions, height: float, x: float) -> PlantOptions:
     return replace(world, terrain=Terrain.step(height, x))
 
 
-def footholds(
-    where: PreparedExperiment, start: tuple[float, float, float], steps: int
-) -> NDArray[np.float64]:
+def footholds(where: PreparedExperiment, start: tuple[float, float, float], steps: int) -> Array:
     """Footholds of a robot in each step when nothing disturbs it.
 
     Args:
@@ -123,7 +121,7 @@ class Disturbance:
     experiment: Callable[[PreparedExperiment, float, int], PreparedExperiment]
     passing: bool = False
     grain: float = 0.0
-    kick: Callable[[PreparedExperiment, float], NDArray[np.float64]] | None = None
+    kick: Callable[[PreparedExperiment, float], Array] | None = None
 
     def levels_for(self, parameters: SlipParameters) -> list[float]:
         """The levels for a template [SI]."""
@@ -182,7 +180,7 @@ def _push(name: str, title: str, sign: float = 1.0, direction: float = 0.0) -> D
         push = Push(sign * level, BEGIN, trial / PHASES, seconds, direction)
         return replace(where, steps=BEGIN + 1 + AFTER, pushes=(push,))
 
-    def kick(where: PreparedExperiment, level: float) -> NDArray[np.float64]:
+    def kick(where: PreparedExperiment, level: float) -> Array:
         return np.array([sign * level / where.gait.parameters.mass, 0.0, 0.0])
 
     levels, kicks = (_IMPULSES, PHASES, impulse_unit), None if direction else kick

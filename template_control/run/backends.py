@@ -7,8 +7,9 @@ from dataclasses import replace
 from math import atan2, cos, degrees, sin
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from template_control.arrays import Array
 from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.lateral import SIDES, LateralPlanner
@@ -43,8 +44,6 @@ from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
-
-Array = NDArray[np.float64]
 
 
 class RobotBackend(ABC):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count, NotNegative
 from template_control.embedding.planners.planner import Planner
@@ -29,7 +30,6 @@ except ImportError:
         "an environment needs the package gymnasium: pip install 'template-control[gym]'"
     ) from None
 
-Array = NDArray[np.float64]
 
 _PUSHED = 0.25  # share of the strides in which a push begins
 _OFF = 4.0  # price of an error of 1 m/s in the speed, or of 1 rad/s in the turning rate

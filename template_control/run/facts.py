@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping
 from typing import Any, Generic, Self, TypeVar, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.run.statistics import Statistics
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.parameters import SlipParameters
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 

@@ -12,8 +12,8 @@ from threading import Lock
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.embedding.controller import EmbeddingController
@@ -42,8 +42,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution
-
-Array = NDArray[np.float64]
 
 _LOCK = Lock()
 _TAKEN: set[int] = set()

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from template_control import settings, storage
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.terrain import Terrain
@@ -22,8 +22,6 @@ from template_control.robot.biped import leg_means
 from template_control.run.facts import Facts
 from template_control.run.tables import Quantity, quantities, to_dataframe, to_xarray
 from template_control.slip.automaton.vocabulary import Phase
-
-Array = NDArray[np.float64]
 
 R = TypeVar("R", bound="Record")
 
@@ -102,22 +100,22 @@ class Record(Facts):
     joint: Annotated[Array, Quantity("T nu:joint 2:axis", "m")]
     contact_force: Annotated[Array, Quantity("T n:foot 2:axis", "N")]
     template_force: Annotated[Array, Quantity("T 2:leg 2:axis", "N")]
-    node: Annotated[NDArray[np.int64], Quantity("T <nodes")]
-    rear: Annotated[NDArray[np.int64], Quantity("T <2")]
-    solved: Annotated[NDArray[np.bool_], Quantity("T")]
+    node: Annotated[IntArray, Quantity("T <nodes")]
+    rear: Annotated[IntArray, Quantity("T <2")]
+    solved: Annotated[BoolArray, Quantity("T")]
     swing_reference: Annotated[Array, Quantity("T 2:group 2:axis", "m")]
     push: Annotated[Array, Quantity("T", "N")]
-    section: Annotated[NDArray[np.int64], Quantity("S <sections")]
+    section: Annotated[IntArray, Quantity("S <sections")]
     section_time: Annotated[Array, Quantity("S", "s")]
     section_state: Annotated[Array, Quantity("S 3:state")]
-    stride: Annotated[NDArray[np.int64], Quantity("S <strides")]
+    stride: Annotated[IntArray, Quantity("S <strides")]
     section_target: Annotated[Array, Quantity("S 3:state")]
     section_accepted: Annotated[Array, Quantity("S", "m/s")]
     section_predicted: Annotated[Array, Quantity("S 3:state")]
     section_controls: Annotated[Array, Quantity("S 6:control")]
     section_offset: Annotated[Array, Quantity("S 3:state")]
-    section_nominal: Annotated[NDArray[np.bool_], Quantity("S")]
-    section_feasible: Annotated[NDArray[np.bool_], Quantity("S")]
+    section_nominal: Annotated[BoolArray, Quantity("S")]
+    section_feasible: Annotated[BoolArray, Quantity("S")]
     section_load: Annotated[Array, Quantity("S")]
     section_trim: Annotated[Array, Quantity("S", "m/s^2")]
     tick_seconds: Annotated[Array, Quantity("ticks", "s")]
@@ -153,7 +151,7 @@ class Record(Facts):
         """Completed steps: strides from one section to the next."""
         return len(self.section_time) - 1
 
-    def in_phase(self, phase: Phase) -> NDArray[np.bool_]:
+    def in_phase(self, phase: Phase) -> BoolArray:
         """(T,) whether the controller was in a phase.
 
         Args:

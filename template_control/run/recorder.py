@@ -9,8 +9,8 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count
 from template_control.compiled import compiled
@@ -27,8 +27,6 @@ from template_control.run.statistics import Counts, Statistics, count, statistic
 from template_control.warm_up import Part, ready
 from template_control.whole_body.solver import Solution
 from template_control.whole_body.task import References
-
-Array = NDArray[np.float64]
 
 _BLOCK = 1024  # ticks
 _CLOCKS = ("tick_seconds", "solve_seconds")  # kept of all ticks

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.errors import ParameterError
@@ -18,8 +18,6 @@ from template_control.estimation.imu import ImuOptions
 from template_control.robot.biped import Biped
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
-
-Array = NDArray[np.float64]
 
 _VELOCITY_NOISE = 20.0  # [1/s] noise of velocities over that of positions
 _CONTACT_DRAWS = 1  # added to the seed: flags are drawn apart from the noise of the state
@@ -76,7 +74,7 @@ class Senses(Protocol):
     def exact(self) -> bool:
         """True if the controller gets the true state."""
 
-    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """q, v that the controller gets of the true q (nq,) [m, rad] and v (nv,) [m/s, rad/s].
 
         The true arrays are not changed; ``contact`` (n,) says which contacts touch the ground.
@@ -98,7 +96,7 @@ class Sensors:
         scale[: robot.directions] = template.rest_length  # the base's place comes first
         self._deviation = np.outer(self.deviations, scale)
 
-    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """As :meth:`Senses.measure`; without noise the true arrays themselves."""
         if self.exact:
             return q, v
@@ -123,7 +121,7 @@ class ForeseeingSensors:
         """See :class:`Senses`."""
         return self._sensors.exact and self._delay.ticks == 0
 
-    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """See :meth:`Senses.measure`."""
         return self._delay.foresee(*self._sensors.measure(q, v, contact))
 
@@ -144,7 +142,7 @@ class ContactSensors:
         self._errors, self._threshold = options.contact_errors, threshold
         self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
 
-    def measure(self, forces: Array) -> tuple[NDArray[np.bool_], Array]:
+    def measure(self, forces: Array) -> tuple[BoolArray, Array]:
         """Flags (n,) and forces (n, d) as the controller gets them; without errors the true forces.
 
         ``forces`` (n, d) are the ground's on each contact, up last [N]; they are not changed.
@@ -188,7 +186,7 @@ class FilteredSensors:
         self._dt = time_step
         self._expected: Array = np.zeros(1)
 
-    def measure(self, q: Array, v: Array, contact: NDArray[np.bool_]) -> tuple[Array, Array]:
+    def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """As :meth:`~template_control.run.sensing.Senses.measure`."""
         measured = self._sensors.measure(q, v, contact)
         return self._filter.update(measured, self._expected, contact, self._dt)

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.robot.biped import Biped
-
-Array = NDArray[np.float64]
 
 _AT_LIMIT = 0.999  # of a torque's limit: the solver comes no nearer
 
@@ -116,7 +114,7 @@ class Counts(NamedTuple):
     work: float
     saturated: int
     failures: int
-    ticks: NDArray[np.int64]
+    ticks: IntArray
     error: Array
     error_square: Array
 

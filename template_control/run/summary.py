@@ -7,14 +7,12 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.run.record import FloatingRecord, Record
 from template_control.slip.automaton.vocabulary import Event, Phase, StrideKind
 from template_control.slip.maps.section import section_of
-
-Array = NDArray[np.float64]
 
 STRIDES: dict[str, str] = {
     StrideKind.WALK: "walking",

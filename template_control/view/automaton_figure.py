@@ -9,12 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.slip.automaton.hybrid import Automaton, Edge
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, StrideKind
-
-Array = NDArray[np.float64]
 
 GAIT_NAMES: dict[str, str] = {
     StrideKind.WALK: "walking",

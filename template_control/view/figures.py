@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count
 from template_control.errors import ParameterError
@@ -48,8 +48,6 @@ from template_control.view.style import (
     shade,
     upward,
 )
-
-Array = NDArray[np.float64]
 
 _LOOK = Look()
 _POSES = 0.06  # [s] from one pose of the stick diagram to the next

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.run.record import Record
 from template_control.run.summary import STANDING
@@ -33,8 +33,6 @@ from template_control.view.style import (
     save_figure,
     shade,
 )
-
-Array = NDArray[np.float64]
 
 _LOOK = Look()
 _WHOLE = slice(None)

@@ -6,13 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.slip.gaits.branch import BranchPoint, Kind, Special
-
-Array = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 _KINDS = {
     Kind.STABLE: "#2a6196",
@@ -89,7 +86,7 @@ def basin_figure(
     energies: Array,
     heights: Array,
     angles: Array,
-    steps: NDArray[np.int64],
+    steps: IntArray,
     converges: BoolArray,
 ) -> Figure:
     """Slices of a basin of attraction at several energies.

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.maps.section import PADDED, VLO, Section, section_of
@@ -26,8 +26,6 @@ from template_control.view.style import (
     shade,
     upward,
 )
-
-Array = NDArray[np.float64]
 
 _LOOK = Look()
 
@@ -49,7 +47,7 @@ def _energies_at(record: Record, sections: list[Section], states: Array) -> Arra
     return np.array([s.energy(p, z[: s.dimension]) for s, z in zip(sections, states, strict=True)])
 
 
-def _broken(values: Array, rear: NDArray[np.int64]) -> Array:
+def _broken(values: Array, rear: IntArray) -> Array:
     """NaN where the stance foot changes, so that no line joins the two steps."""
     out = values.copy()
     out[1:][np.diff(rear) != 0] = np.nan

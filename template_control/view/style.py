@@ -14,16 +14,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.errors import ParameterError
 from template_control.run.record import FloatingRecord, Record
 from template_control.slip.automaton.vocabulary import Event, Phase, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import atomic_path
-
-Array = NDArray[np.float64]
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 SIDES = (LEFT, RIGHT)

@@ -9,8 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.plant.plant import plant_name
 from template_control.robustness.campaign import Campaign, Trial
 from template_control.robustness.disturbances import AFTER
@@ -65,7 +65,7 @@ def campaign_figure(campaign: Campaign) -> Figure:
     return figure
 
 
-def _share_panel(axes: Axes, values: NDArray[np.float64], trials: Sequence[Trial]) -> None:
+def _share_panel(axes: Axes, values: Array, trials: Sequence[Trial]) -> None:
     for shift, (label, color, good) in enumerate(
         (
             ("no fall", RIGHT, [not t.fell for t in trials]),
@@ -184,7 +184,7 @@ def _points(axes: Axes, study: Study, result: SweepResult) -> None:
     axes.set_ylabel(as_text(study.figures[0]))
 
 
-def _heat_map(figure: Figure, axes: Axes, study: Study, values: NDArray[np.float64]) -> None:
+def _heat_map(figure: Figure, axes: Axes, study: Study, values: Array) -> None:
     image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
     first, second = study.grid
     axes.set_ylabel(as_text(first))

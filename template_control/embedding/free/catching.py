@@ -13,12 +13,10 @@ from math import hypot
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.free.sway import CATCHING_SHARE
 from template_control.slip.similarity import Scale
-
-Array = NDArray[np.float64]
 
 _ROUNDS = 4  # of the step's duration, which depends on the foothold, and the foothold on it
 # A foot moves ahead or back only where xi will be further off the middle of the feet than this

@@ -13,8 +13,8 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
 from template_control.embedding.planners.planner import Decision
@@ -42,9 +42,6 @@ from template_control.slip.lateral.placing import (
 )
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
-
-Array = NDArray[np.float64]
-
 
 BEYOND = 0.03
 """A foothold that is wanted further than this beyond its bounds is out of reach [m, of the

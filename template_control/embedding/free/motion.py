@@ -12,8 +12,8 @@ from math import atan2, cos, inf, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.free.catching import Reach, catching_step
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.lateral import (
@@ -44,8 +44,6 @@ from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
 from template_control.whole_body.solver import SOLE_SHARE
 from template_control.whole_body.task import References
-
-Array = NDArray[np.float64]
 
 _SIDE = 1  # y, to the left
 SIDE_RAMP = 0.05  # change of the speed to the left [m/s^2]

@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import sample
 from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
@@ -19,8 +19,6 @@ from template_control.embedding.standing.supports import UNLOADING
 from template_control.robot.terms import onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.solver import SOLE_SHARE
-
-Array = NDArray[np.float64]
 
 _HOLDING = 1.5  # by which it moves beyond the capture point's distance from where a robot stands
 _LUNGE = 3.0  # by which a trunk that rolls leads a capture point back, over how fast it leaves

@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
 from template_control.robot.terms import MOST_CONTACTS
 from template_control.slip.similarity import TIME, Scale, tuned
-
-Array = NDArray[np.float64]
-
 
 # A foot on the ground that moves faster along it slides [m/s, of the reference template]. Speeds
 # of a foot that stands are noise; 0.5 mrad of it is about 0.02 m/s there, which never stays this

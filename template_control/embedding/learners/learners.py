@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from template_control.arrays import Array
 from template_control.embedding.learners.friction import set_friction
 from template_control.embedding.learners.lean import TrunkLean
 from template_control.embedding.learners.momentum import LoadEstimate, MomentumTrim
@@ -17,8 +15,6 @@ from template_control.robot.biped import Biped
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
-
-Array = NDArray[np.float64]
 
 
 class Learners:

@@ -12,17 +12,14 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait, vlo_jacobians
 from template_control.slip.parameters import SlipParameters
 from template_control.structured import Number
-
-Array = NDArray[np.float64]
-
 
 # Load estimate.
 _LOAD_GAIN = 0.7  # share of a step's mean feedback that enters the estimate

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Range
 from template_control.embedding.planners.gait_table import (
@@ -46,8 +46,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import SPEED, TIME, Scale, scaled, tuned
 from template_control.warm_up import Part, ready
-
-Array = NDArray[np.float64]
 
 MOST_STEPS = 6
 """That a plan may look ahead."""

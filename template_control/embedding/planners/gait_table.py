@@ -6,9 +6,9 @@ from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, settling_map
 from template_control.slip.automaton.vocabulary import Slot, StrideKind
@@ -19,8 +19,6 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
-
-Array = NDArray[np.float64]
 
 CONTROLS = 4
 """Controls of a step: alpha, kappa_1, kappa_2, kappa_p."""

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.cholesky import cholesky
 from template_control.compiled import compiled
 from template_control.embedding.planners.gait_table import (
@@ -44,8 +44,6 @@ from template_control.slip.maps.return_map import (
     one_stride,
     section_jacobian,
 )
-
-Array = NDArray[np.float64]
 
 BOUNDS = np.array(
     [[angle, *[share] * 3] for angle, share in zip(ANGLE_RANGE, STIFFNESS_RANGE, strict=True)]
@@ -81,7 +79,7 @@ class PlanProblem(NamedTuple):
     knee_moment: float
     earliest: float
     rounds: int
-    columns: NDArray[np.int64]
+    columns: IntArray
 
 
 class PlanTarget(NamedTuple):

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_discrete_are
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.embedding.planners.planner import (
@@ -55,8 +55,6 @@ from template_control.slip.similarity import (
     tuned,
 )
 from template_control.warm_up import ready
-
-Array = NDArray[np.float64]
 
 _Three = tuple[NotNegative, NotNegative, NotNegative]
 _VLO_STATE = (SPEED, LENGTH, SPEED)

@@ -10,8 +10,8 @@ from math import isfinite, nan, pi
 from typing import Annotated, NamedTuple, ParamSpec, Protocol, runtime_checkable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.fitting import answered, answered_or_none, name_of
 from template_control.checks.ranges import Shape
@@ -23,7 +23,6 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 
-Array = NDArray[np.float64]
 P = ParamSpec("P")
 
 

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-
-Array = NDArray[np.float64]
 
 
 class ResidualPlanner(Planner):

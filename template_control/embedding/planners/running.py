@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, Positive
 from template_control.compiled import compiled
@@ -29,8 +29,6 @@ from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
-
-Array = NDArray[np.float64]
 
 _SLOTS = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SC), int(Slot.K_SD)]  # the first three
 _SAME = 1e-9  # rounding [m/s, m]

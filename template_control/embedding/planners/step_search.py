@@ -11,15 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import RESULTS, one_stride
-
-Array = NDArray[np.float64]
 
 _FAST = np.int64(MapKind.IMPROVED)  # Numba would compile once more for a literal int
 _FLIES = int(Outcome.UNWANTED_FLIGHT)
@@ -89,7 +87,7 @@ class Law(NamedTuple):
     offset: Array
     lower: Array
     upper: Array
-    slots: NDArray[np.int64]
+    slots: IntArray
     second_steps: Array
     trusted_price: float
     effort: Array

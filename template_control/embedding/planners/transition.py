@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.embedding.planners.planner import (
@@ -30,8 +30,6 @@ from template_control.slip.control.stride_solver import Prior, StrideEnd, solve_
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import Scale, scaled, tuned
-
-Array = NDArray[np.float64]
 
 _LEGS = (Slot.K_SC, Slot.K_SD)  # of a gait, before and after the bottom
 

@@ -13,8 +13,8 @@ from math import hypot
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.compiled import compiled
@@ -24,8 +24,6 @@ from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import STAND_HEIGHT
 from template_control.slip.similarity import LENGTH, TIME, Scale, scaled, tuned
 from template_control.warm_up import Part
-
-Array = NDArray[np.float64]
 
 SPACING = 0.3
 """Distance of the feet where a run begins, over l0."""

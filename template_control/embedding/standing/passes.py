@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.standing.curves import STAND, BetweenFeet, StandingOptions
 from template_control.embedding.standing.pressure import PRESSURE
 from template_control.embedding.standing.supports import OverFeet
@@ -20,8 +20,6 @@ from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 from template_control.warm_up import ready
-
-Array = NDArray[np.float64]
 
 _FLAT = 0.02  # touchdown angle of a leg that does not land [rad]
 _FLATTER = 0.05  # the way past VLO goes on beyond the flattest landing [rad]

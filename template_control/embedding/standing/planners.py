@@ -12,8 +12,8 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
@@ -44,8 +44,6 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
-
-Array = NDArray[np.float64]
 
 _CURVED = (
     StrideKind.STAND,

@@ -19,13 +19,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.dynamics.timed import TERMS, polynomial, quintic
 from template_control.warm_up import Part
-
-Array = NDArray[np.float64]
 
 SMOOTH = 0.1
 """T, over which p is to change [s, of the reference template]."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from math import factorial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.embedding.standing.curves import PLACE, BetweenFeet, Found
 from template_control.embedding.standing.pressure import (
     ARRIVE,
@@ -23,8 +23,6 @@ from template_control.embedding.standing.pressure import (
 from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial
 from template_control.slip.similarity import Scale
 from template_control.whole_body.solver import SOLE_SHARE
-
-Array = NDArray[np.float64]
 
 _PIECES = 20  # of a curve
 _PASSING = 2.0  # longest time to a foot that is passed, over that at the present speed

@@ -9,15 +9,13 @@ from math import cos, radians, sin
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.run.live import Tick
 from template_control.run.record import Record
 from template_control.run.velocity import VelocityRange
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE
-
-Array = NDArray[np.float64]
 
 _PUSH = 0.04  # of m sqrt(g l0), size of a push at first: 10 N s for five-link
 _FRICTIONS = (0.05, 1.2)

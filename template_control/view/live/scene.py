@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 from matplotlib.colors import to_rgb
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.plant.terrain import Terrain
 from template_control.robot.biped import leg_means
 from template_control.run.record import FloatingRecord, Record
@@ -25,8 +25,6 @@ from template_control.view.replay.playback import CARRYING, force_arrows, spring
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals
 from template_control.view.replay.scene import plates, points, raised, smoothed, strip, turned_to
 from template_control.view.style import COM, TEMPLATE, feet_shown
-
-Array = NDArray[np.float64]
 
 _GROUND, _LINES, _PUSH = "#dde1e6", "#b4bac2", "#c22f3d"
 _SEEN = 12.0  # of l0: the ground to all sides of the robot
@@ -64,9 +62,9 @@ class Frame:
     com: Array
     template: Array
     toes: Array
-    loaded: NDArray[np.bool_]
+    loaded: BoolArray
     foot: Array
-    stands: NDArray[np.bool_]
+    stands: BoolArray
     arrow: Array
 
 
@@ -353,7 +351,7 @@ def _rgb(color: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
-def _arrow() -> tuple[Array, NDArray[np.int64]]:
+def _arrow() -> tuple[Array, IntArray]:
     """Vertices and faces of an arrow one metre long, straight up."""
     sides = 10
     turn = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)

@@ -15,8 +15,8 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RecordError
 from template_control.run.record import FloatingRecord, Record
 from template_control.storage import atomic_path
@@ -24,8 +24,6 @@ from template_control.view.replay.playback import Playback, coil, pushing, sprin
 from template_control.view.replay.robot_visuals import model_of
 from template_control.view.replay.scene import in_space, smoothed
 from template_control.view.style import COM, SIDES, TEMPLATE, TRUNK, as_text, feet_shown, legs_shown
-
-Array = NDArray[np.float64]
 
 _WIDTH = 2.6  # of the picture, in rest lengths, at the least
 _FLATTER = 0.75  # height of the picture over its width

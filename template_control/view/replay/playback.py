@@ -6,15 +6,13 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 from template_control.run.record import Record
 from template_control.view.style import interval
-
-Array = NDArray[np.float64]
 
 _ZIGZAGS = 12
 CARRYING = 0.005
@@ -36,7 +34,7 @@ class Playback:
     """
 
     record: Record
-    rows: NDArray[np.int64]
+    rows: IntArray
     clock: Array
 
 
@@ -73,7 +71,7 @@ def playback(
     return Playback(record, np.searchsorted(middles, moments), clock)
 
 
-def carrying(record: Record) -> NDArray[np.bool_]:
+def carrying(record: Record) -> BoolArray:
     """(T, n) whether the ground carries each foot."""
     return np.asarray(record.contact_force[:, :, 1] > CARRYING * record.weight)
 
@@ -88,7 +86,7 @@ def stances(record: Record) -> list[list[tuple[int, int]]]:
     return found
 
 
-def pushing(record: Record) -> NDArray[np.bool_]:
+def pushing(record: Record) -> BoolArray:
     """(T, 2) whether the template's rear and its front leg push."""
     return np.asarray(np.linalg.norm(record.template_force, axis=2) > CARRYING * record.weight)
 
@@ -112,7 +110,7 @@ def coil(shape: Array, begin: Array, end: Array) -> Array:
     return np.asarray(begin[:, None] + np.stack((normal, span), axis=1) @ shape.T)
 
 
-def force_arrows(force: Array, on: NDArray[np.bool_], weight: float, length: float) -> Array:
+def force_arrows(force: Array, on: BoolArray, weight: float, length: float) -> Array:
     """The ground's forces (..., d) [N] as arrows [m], zero where a foot is not ``on`` the ground.
 
     The ``weight`` [N] is 0.4 of the rest ``length`` [m] long. An arrow longer than two weights, at

@@ -11,14 +11,12 @@ import numpy as np
 import pinocchio as pin
 from matplotlib.colors import to_rgba
 from meshcat import geometry as mg
-from numpy.typing import NDArray
 
+from template_control.arrays import Array
 from template_control.errors import RecordError
 from template_control.robot.legs import foot_frame
 from template_control.run.record import FloatingRecord, Record
 from template_control.view.style import TRUNK, feet_shown
-
-Array = NDArray[np.float64]
 
 _STICK = 0.02  # radius of a stick over the template's rest length
 

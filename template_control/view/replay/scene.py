@@ -17,8 +17,8 @@ from meshcat import geometry as mg
 from meshcat.animation import Animation, AnimationClip
 from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform
 from meshcat.path import Path as ScenePath
-from numpy.typing import NDArray
 
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.plant.terrain import Terrain
 from template_control.run.record import Record
 from template_control.view.replay.playback import (
@@ -32,12 +32,10 @@ from template_control.view.replay.playback import (
 from template_control.view.replay.robot_visuals import Robot, foot_sides, load_visuals, placements
 from template_control.view.style import COM, TEMPLATE, feet_shown
 
-Array = NDArray[np.float64]
-
 _AROUND = 11  # places that a height is the mean of
 
 
-def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, IntArray]:
     """Level rectangles: vertices (4 N, 3) and faces (2 N, 3) from centres (N, 3) [m].
 
     ``size`` is along x and y [m].
@@ -62,7 +60,7 @@ def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tupl
     return mg.TriangularMeshGeometry(*strip(line, sides)), place
 
 
-def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, IntArray]:
     """A surface across a line: vertices (2 N, 3) and faces (2 N - 2, 3).
 
     Arguments as for :func:`ground_shape`.
@@ -176,7 +174,7 @@ class _Gradual(mg.TriangularMeshGeometry):
     ``frame`` says in which frame each vertex appears.
     """
 
-    def __init__(self, vertices: Array, faces: NDArray[np.int64], frame: Array) -> None:
+    def __init__(self, vertices: Array, faces: IntArray, frame: Array) -> None:
         super().__init__(vertices, faces)
         self.frame = frame
 
@@ -232,13 +230,13 @@ class _Scene:
     def animate(self, path: str, name: str, kind: str, values: Any) -> None:
         self._track(path, _Track(name, kind, self.clock, values))
 
-    def show(self, path: str, visible: NDArray[np.bool_]) -> None:
+    def show(self, path: str, visible: BoolArray) -> None:
         """Keys only where it changes, and at both ends: a switch is not interpolated."""
         keys = np.flatnonzero(np.diff(visible, prepend=~visible[:1]))
         keys = np.unique(np.append(keys, len(visible) - 1))
         self._track(path, _Track("visible", "bool", self.clock[keys], visible[keys].tolist()))
 
-    def stretch(self, path: str, begin: Array, span: Array, visible: NDArray[np.bool_]) -> None:
+    def stretch(self, path: str, begin: Array, span: Array, visible: BoolArray) -> None:
         """Let what stands from 0 to 1 on the vertical reach along ``span`` from ``begin``."""
         self.animate(path, "position", "vector3", begin)
         self.animate(path, "quaternion", "quaternion", turned_to(span))
