@@ -280,11 +280,12 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
         union = [h for h in get_args(hint) if h is not NoneType] if _is_union(hint) else [hint]
         tables = [h for h in union if is_dataclass(h) and _said(h)]
         if tables:
-            if kinds := _kinds(tables):
+            kinds = _kinds(tables)
+            if kinds:
                 usual = _usual_kind(f) or next(iter(kinds))
                 about = f"one of {', '.join(kinds)}"
                 found.setdefault(f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, usual, about))
-            for table in tables:
+            for table in kinds.values() or tables:
                 for leaf in leaves(table, place):
                     found.setdefault(leaf.path, leaf)
         elif _said(hint):
@@ -355,7 +356,8 @@ def _fits(hint: Any, value: Any) -> bool:
     """True if a field's dataclass is one that its table can be read as."""
     if not is_dataclass(value) or isinstance(value, type):
         return True
-    return type(value) in (get_args(hint) if _is_union(hint) else (hint,))
+    tables = get_args(hint) if _is_union(hint) else (hint,)
+    return type(value) in (_kinds(tables).values() or tables)
 
 
 def _toml_value(value: Any, where: str) -> Any:

@@ -14,8 +14,6 @@ from template_control.storage import Files, writing
 from template_control.terminal import plain_console, show, table
 from template_control.view.style import save_figure
 
-_ON_A_ROBOT = "fig10"
-
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add the command's description and options."""
@@ -24,11 +22,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.formatter_class = argparse.ArgumentDefaultsHelpFormatter
     parser.add_argument("name", metavar="NAME", help=f"one of {', '.join(REPRODUCTIONS)}")
-    parser.add_argument(
-        "--robot",
-        metavar="NAME|URDF",
-        help="of fig10: Example I on this robot, such as runner, with its template alone",
-    )
     values.add_folder(parser, "runs/reproduce", "folder for the figures")
     values.add_json(parser, "the numbers as JSON")
 
@@ -43,12 +36,10 @@ def run(options: argparse.Namespace) -> int:
         raise ParameterError(
             f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"
         )
-    if options.robot is not None and options.name != _ON_A_ROBOT:
-        raise ParameterError(f"--robot goes with {_ON_A_ROBOT} only: leave it out")
     files, paths = Files(), []
     with nullcontext() if options.no_figures else writing(options.output) as folder:
         with _announced(options.name):
-            result = REPRODUCTIONS[options.name]() if options.robot is None else _on(options.robot)
+            result = REPRODUCTIONS[options.name]()
         if folder is not None:
             paths = files.write(lambda: _save(result, folder)) or []
     if options.json:
@@ -67,13 +58,6 @@ def _announced(name: str) -> AbstractContextManager[object]:
         return console.status(f"computing {name}")
     console.print(f"computing {name}: about {LONG[name]} s on two cores", highlight=False)
     return nullcontext()
-
-
-def _on(robot: str) -> Reproduction:
-    # Here, because the other reproductions need no robot.
-    from template_control.paper.example_one import fig10_on
-
-    return fig10_on(robot)
 
 
 def _save(result: Reproduction, folder: Path) -> list[Path]:

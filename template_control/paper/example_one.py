@@ -6,18 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from template_control.embedding.robot_route import robot_route
 from template_control.paper.reproduction import Reproduction
-from template_control.plant.c_library import stdout_to_stderr
-from template_control.robot.library import load_robot
-from template_control.run.experiment import Experiment
-from template_control.run.simulation import simulate
-from template_control.run.summary import summarise
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
-from template_control.view.scenario_figures import energy_figure, route_figures, scenario_figure
-from template_control.view.style import Look
+from template_control.view.scenario_figures import energy_figure, scenario_figure
 
 _TOP_SPEED = 5.0
 _PAPER_STIFFNESS = 28.2e3
@@ -109,65 +102,4 @@ def fig10() -> Reproduction:
             " V-A; Table IV's 1.1 m/s would be 1.13 m/s.",
         ),
         figures={"fig10": scenario_figure(record), "fig10_energies": energy_figure(record)},
-    )
-
-
-def fig10_on(robot_name: str) -> Reproduction:
-    """Example I on a robot, shipped or a URDF's path, compared with its template.
-
-    A ScenarioError if the robot cannot follow Example I.
-    """
-    robot = load_robot(robot_name)
-    route = robot_route(robot, example_one())
-    with stdout_to_stderr():
-        record = simulate(Experiment(robot, route))
-    template = simulate_scenario(route.scenario)
-    figures, names = summarise(record, None), record.kinds_of_stride
-    torque, speed = figures["joint_torque"], figures["joint_speed"]
-    data = {
-        "robot": robot.name,
-        "completed": record.arrived,
-        "fall_reason": figures["fall_reason"],
-        "top_speed": float(record.section_state[:, 0].max()),
-        "speed_error_rms": figures["speed_error_rms"],
-        "walking_steps_after": int(np.argmax([name != StrideKind.WALK for name in names[-2::-1]])),
-        "joint_torque": torque,
-        "joint_speed": speed,
-        "saturated_share": figures["saturated_share"],
-        "qp_failures": figures["qp_failures"],
-        "template": summary(template) if template.completed else {"completed": False},
-    }
-    other = data["template"]
-    top = float(template.section_state[:, 0].max())
-
-    def of(joints: dict[str, dict[str, float]], unit: str) -> str:
-        most = max(joints.values(), key=lambda joint: joint["peak"] / joint["limit"])
-        return f"{most['peak']:.3g} of {most['limit']:g} {unit}"
-
-    rows = [
-        ("completed", *("yes" if x["completed"] else "no" for x in (other, data))),
-        ("top speed at an apex [m/s]", f"{top:.3f}", f"{data['top_speed']:.3f}"),
-        (
-            "speed error RMS, all sections [m/s]",
-            *(f"{x['speed_error_rms']:.2g}" if x["completed"] else "" for x in (other, data)),
-        ),
-        ("walking steps after RWT", "", f"{data['walking_steps_after']}"),
-        ("joint torque, nearest its limit", "", of(torque, "N m")),
-        ("joint speed, nearest its limit", "", of(speed, "rad/s")),
-        ("ticks with a torque at its limit", "", f"{100 * data['saturated_share']:.2f} %"),
-        ("failed QPs", "", f"{data['qp_failures']}"),
-    ]
-    return Reproduction(
-        title=f"Fig. 10: Example I on {robot.name}",
-        columns=("", "its template, paper map", robot.name),
-        rows=rows,
-        data=data,
-        notes=(
-            "The robot's apexes are as high as suits its knees, not 0.98 m.",
-            "Wanted is the profile, which waits for nobody.",
-        ),
-        figures={
-            f"fig10_{name}": draw(record, Look())
-            for name, draw in route_figures(record, template).items()
-        },
     )

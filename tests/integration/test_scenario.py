@@ -13,6 +13,7 @@ from template_control.cli.main import main
 from template_control.errors import RecordError, ScenarioError
 from template_control.paper import REPRODUCTIONS
 from template_control.paper.example_one import summary
+from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment, example_one, load_scenario
@@ -179,20 +180,18 @@ LESS = {
 
 @pytest.mark.slow(seconds=6)
 def test_example_one_on_a_robot(tmp_path, capfd):
-    asked = ["reproduce", "fig10", "--robot", "runner", "--output", str(tmp_path), "--json"]
-    assert main(asked) == 0
+    asked = ["go", str(EXAMPLES / "example_one.toml"), "--robot", "runner", "--json"]
+    assert main([*asked, "--no-figures", "--output", str(tmp_path)]) == 0
     data = json.loads(capfd.readouterr().out)
-    assert data["completed"]
-    assert data["walking_steps_after"] == 20
-    assert data["top_speed"] == pytest.approx(5.0, abs=0.05)
+    assert not data["fell"]
     assert data["speed_error_rms"] <= 0.15
     assert data["qp_failures"] == 0
-    assert {Path(path).stem for path in data["figures"]} == {"fig10_scenario", "fig10_transitions"}
-
-
-def test_a_robot_goes_with_example_one_only(capfd):
-    assert main(["reproduce", "table3", "--robot", "runner"]) == 2
-    assert "--robot goes with fig10 only" in capfd.readouterr().err
+    record = Record.load(tmp_path / "run.npz")
+    assert record.arrived
+    kinds = record.kinds_of_stride
+    assert kinds[-20:] == ["w"] * 20
+    assert "w" not in kinds[-21]
+    assert record.section_state[:, 0].max() == pytest.approx(5.0, abs=0.05)
 
 
 @pytest.mark.parametrize(

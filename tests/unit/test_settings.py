@@ -16,6 +16,7 @@ from template_control import settings
 from template_control.embedding.phases import PHASES
 from template_control.errors import ParameterError
 from template_control.robot.start import Pose
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.scenario.scenario import Scenario
 
 
@@ -160,3 +161,9 @@ def test_what_toml_cannot_say_is_refused_unless_it_is_the_default():
         settings.to_table(replace(tc.Experiment(), controller=tc.EmbeddingOptions(phases=other)))
     with pytest.raises(ParameterError, match="phases can be given in Python only"):
         settings.from_table(tc.EmbeddingOptions, {"phases": {}})
+
+
+def test_a_gait_of_ones_own_is_given_in_python_only():
+    gait = Gait("hop", tc.SlipParameters(), np.array([0.0, 1.02]), np.zeros(6), 0.0, 0.5, "hop")
+    with pytest.raises(ParameterError, match="motion is Gait, which TOML cannot say"):
+        settings.to_table(tc.Experiment(motion=gait))
