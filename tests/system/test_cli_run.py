@@ -12,6 +12,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.run.record import Record
 from template_control.run.summary import summarise
+from template_control.slip.gaits.gait import flight_share
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.view.figures import FIGURES, figures_of, save_figures
 
@@ -162,7 +163,7 @@ def test_what_is_told_of_a_run_is_in_its_record(record):
     stands = record.contact_force[:, :, 1] > 0.0
     flies = ~stands[:, 0] & ~stands[:, 1]
     assert figures["flight_share"]["robot"] == pytest.approx(np.count_nonzero(flies) / len(flies))
-    template = running_gait(tc.template_for(tc.load_robot("five-link")), 2.5).flight_share
+    template = flight_share(running_gait(tc.template_for(tc.load_robot("five-link")), 2.5))
     assert figures["flight_share"]["template"] == pytest.approx(template)
     # No foot stands for the flight's share; in a run never both do.
     one_foot = (1.0 - figures["flight_share"]["robot"]) / 2.0

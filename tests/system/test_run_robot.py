@@ -21,6 +21,7 @@ from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
+from template_control.slip.gaits.gait import flight_share
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import SteadyRoute
@@ -69,7 +70,7 @@ def test_robot_runs_at_three_metres_a_second(record, gait):
 def test_it_flies_and_lands_on_either_foot_in_turn(record, gait):
     flying = ~stance(record)
     force = record.contact_force[:, :, 1]
-    assert flying.mean() == pytest.approx(gait.flight_share, abs=0.06)
+    assert flying.mean() == pytest.approx(flight_share(gait), abs=0.06)
     assert force[flying].max(axis=1).mean() < 20.0, "nothing carries in flight"
     landings = np.flatnonzero(np.diff(flying.astype(int)) < 0) + 1
     assert record.rear[landings].tolist() == [0, 1] * 10

@@ -16,7 +16,7 @@ from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import Gait, flight_share
+from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
@@ -53,11 +53,6 @@ class RunningGait(Gait):
     def apex(self) -> Array:
         """(2,) :attr:`state`."""
         return self.state
-
-    @property
-    def flight_share(self) -> float:
-        """Share of the duration without a foot on the ground."""
-        return flight_share(self)
 
 
 @checked
