@@ -41,7 +41,6 @@ SHARED = (
     "checks",
     "cholesky",
     "compiled",
-    "deprecated",
     "errors",
     "settings",
     "storage",
