@@ -41,7 +41,8 @@ _BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
 _BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
 TO_REST = ("DS_ar^s", "DS_br^ws", "DS_br^sf")
 """Nodes in which a curve carries the CoM to rest over both feet."""
-_CURVED = (*TO_REST, "DS_bl^ww")
+_START = AUTOMATON.starts[StrideKind.STAND_TO_WALK]
+_CURVED = (*TO_REST, _START, "DS_bl^ww")
 _STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)
 
 EXITS: tuple[Exit, ...] = (
@@ -50,12 +51,12 @@ EXITS: tuple[Exit, ...] = (
     *(Exit(node, StrideKind.WALK_TO_STAND, "DS_br^ws") for node in _BOTH_STAND),
     Exit("DS_bl^ww", StrideKind.WALK_TO_STAND, "DS_br^ws"),
     *(Exit(node, StrideKind.STEP_BACK, "SS_bt^sb") for node in _BEFORE_VLO),
-    *(Exit(node, step, AUTOMATON.starts[step]) for node in TO_REST for step in _STEPS),
+    *(Exit(node, step, AUTOMATON.starts[step]) for node in (*TO_REST, _START) for step in _STEPS),
 )
 """All of them. A fast walk runs. The springs of a slow one would throw it back: a curve in time
 carries the CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
-Where both feet stand and the CoM cannot come to rest, a step is made; where it cannot come to
-another speed, it comes to rest."""
+Where both feet stand and the CoM cannot come to rest, or not start, a step is made; where it cannot
+come to another speed, it comes to rest."""
 
 
 def entry(node: str, left: str, stride: str) -> str | None:

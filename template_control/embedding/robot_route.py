@@ -13,7 +13,6 @@ from template_control.embedding.planners.running import AGILE
 from template_control.embedding.robot_template import can_stand, template_for
 from template_control.errors import ScenarioError
 from template_control.robot.biped import Biped
-from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
 from template_control.slip.gaits.walking_by_speed import family_speeds, speed_range
@@ -35,8 +34,8 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
         robot: its last update is overwritten.
         scenario: speeds in m/s, as they are; its heights are scaled with l0.
         push_off: whether its walk has the gaits of the family by speed, in steps with push-off,
-            and their heights at VLO; None: where a planar robot walks only. Its planner then takes
-            the nearest speed where a segment wants what cannot be had.
+            and their heights at VLO; None: wherever it may. Its planner then takes the nearest
+            speed where a segment wants what cannot be had.
 
     Raises:
         ScenarioError: if a segment stands, and the robot cannot; if the start, or a segment of
@@ -52,12 +51,13 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
     own = scenario.on(template_for(robot))
     p = own.parameters
     unit = p.speed_unit
-    if push_off is None:
-        push_off = own.only_walks and isinstance(robot, PlanarBiped)
-    if push_off and not own.only_walks:
+    bears = robot.half_length > 0.0
+    may = own.has_any_speed(bears)
+    if push_off and not may:
         raise ScenarioError(
             "the scenario does more than walk: its walk has no push-off; leave planner ahead out"
         )
+    push_off = may if push_off is None else push_off
     if not push_off:
         _check_speeds(robot, own)
         _check_accelerations(robot, own)
@@ -73,7 +73,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
         lambda speed: suited_height(speed / unit) * p.rest_length,
         vlo_height=_family_height(p) if push_off else None,
         walks=StrideKind.WALK_PUSH_OFF if push_off else StrideKind.WALK,
-        bears=robot.half_length > 0.0,
+        bears=bears,
     )
 
 

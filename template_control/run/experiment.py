@@ -18,14 +18,15 @@ from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.course import Course
 from template_control.embedding.free.options import (
     AnyOptions,
+    SoleOptions,
+    TrotOptions,
+    ahead_options,
     default_options,
     lqr_options,
     options_of_kind,
 )
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
-    BIPED_AHEAD,
-    FREE_AHEAD,
     AheadOptions,
     AheadPlanner,
     check_feasibility,
@@ -207,9 +208,13 @@ class Experiment(Checked):
         runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
         if runs or isinstance(motion, RunningGait):
             return RunningOptions()
-        if isinstance(motion, Scenario) and motion.only_walks and not self.free:
-            return AheadOptions()
-        return lqr_options(self._kind())
+        kind = self._kind()
+        bears = isinstance(kind, SoleOptions | TrotOptions)
+        stands = isinstance(motion, GaitSpec) and (motion.from_stand or motion.to_stand)
+        any_speed = isinstance(motion, Scenario) and motion.has_any_speed(bears)
+        if (stands and bears) or (any_speed and (bears or not self.free)):
+            return ahead_options(kind)
+        return lqr_options(kind)
 
     def with_(self, keys: Mapping[str, Any]) -> Experiment:
         """The same experiment with some keys set, named as in its TOML file.
@@ -298,8 +303,8 @@ class Experiment(Checked):
         if isinstance(motion, Scenario):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
-        if planner is None and self.free and isinstance(motion, SpeedRoute):
-            planner = FREE_AHEAD if robot.paired else BIPED_AHEAD
+        if planner is None and isinstance(motion, SpeedRoute):
+            planner = ahead_options(self.tuning)
         if planner is None:
             return motion, default_planners(motion, standing=standing_options(robot))
         if isinstance(planner, Mapping):

@@ -10,6 +10,8 @@ from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Cause
 from template_control.embedding.recovery import EXITS, CatchOptions, Recovery
 from template_control.embedding.rollout import ReplanOptions
+from template_control.embedding.standing.curves import StandingOptions
+from template_control.embedding.standing.planners import standing_planners
 from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON
@@ -18,6 +20,7 @@ from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import SteadyRoute
+from template_control.slip.scenario.speed_route import SpeedRoute
 
 P = SlipParameters()
 WALK = walking_gait(P, 1.1)
@@ -172,3 +175,22 @@ def test_a_robot_that_is_pushed_back_hard_walks_on(phase, caught):
     )
     assert left.fell
     assert set(strides(left)) == {"wp"}
+
+
+@pytest.mark.parametrize(("apart", "kind"), [(0.0, "sf"), (0.02, "sf"), (0.25, "sw")])
+def test_from_feet_too_close_for_a_start_it_steps_first(apart, kind):
+    """Soles next to each other do not bear the centre of pressure far enough behind the CoM."""
+    route = SpeedRoute(P, lambda time: 0.9 if time > 1.0 else 0.0, gaits=("stand", "walk"))
+    options = StandingOptions(half_length=0.1, slowest=0.3)
+    planners = standing_planners(P, options) | {"wp": tc.LqrPlanner(tc.gait_for_speed(P, 0.9))}
+    supervisor = StrideSupervisor(
+        route, planners, ReplanOptions(), AUTOMATON, {"DS_ar^s", "DS_ar^sw", "DS_ar^sf"}
+    )
+    supervisor.begin(REST)
+    state, toes = np.array([0.5 * apart, 0.97, 0.0, 0.0]), np.array([0.0, apart])
+    there = TemplateState(state, toes, acceleration=np.zeros(2))
+    assert supervisor.decide(REST, there, 0.0, NOTHING).name == "DS_ar^s"
+    first = supervisor.decide(REST, there, 1.5, NOTHING)
+    assert first.name == AUTOMATON.starts[kind]
+    assert supervisor.goal.stride == kind
+    assert supervisor.decision.feasible

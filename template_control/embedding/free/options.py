@@ -28,6 +28,7 @@ from template_control.embedding.phases import (
     running_phases,
     standing_phases,
 )
+from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD, AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.standing.supports import UNLOADING
 from template_control.embedding.swing import SwingOptions
@@ -351,3 +352,10 @@ def lqr_options(options: EmbeddingOptions) -> LqrOptions:
     if isinstance(options, SoleOptions):
         return _SOLE_PLANNER
     return FREE_PLANNER if isinstance(options, FreeOptions) else LqrOptions()
+
+
+def ahead_options(options: EmbeddingOptions) -> AheadOptions:
+    """Tuning of the planner that looks ahead for the kind of robot that has these options."""
+    if isinstance(options, TrotOptions):
+        return FREE_AHEAD
+    return BIPED_AHEAD if isinstance(options, FreeOptions) else AheadOptions()

@@ -22,7 +22,7 @@ from template_control.robot.start import Pose
 from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial, quintic
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import STAND_HEIGHT
-from template_control.slip.similarity import LENGTH, TIME, Scale, scaled, tuned
+from template_control.slip.similarity import LENGTH, SPEED, TIME, Scale, scaled, tuned
 from template_control.warm_up import Part
 
 SPACING = 0.3
@@ -49,6 +49,8 @@ class StandingOptions(Checked):
             has to be over the one that stays.
         single: shortest time on one leg before the VLO to which a start or a change of speed leads
             [s]: the other foot passes the one that stands.
+        slowest: least speed at VLO that a start leads to [m/s]. From feet too close to each other
+            to reach it, the robot steps first.
     """
 
     height: Positive = tuned(STAND_HEIGHT, LENGTH)
@@ -58,6 +60,7 @@ class StandingOptions(Checked):
     slant: NotNegative = tuned(0.0)
     shift: NotNegative = tuned(0.0, TIME)
     single: NotNegative = tuned(0.15, TIME)
+    slowest: NotNegative = tuned(0.0, SPEED)
 
 
 @checked

@@ -148,8 +148,9 @@ class CurvePlanner(Planner):
         second = self._passes.arriving(first.node, liftoff[:, :2].T.ravel(), u, first.toes)
         speed = self._speed = float(over.vlo[0])
         accepted = None if speed == decision.predicted[0] else speed
-        leads = found.excess <= self._launch
-        chosen = replace(decision, controls=u, feasible=feet.fits(found), lasting=leads)
+        slowest = self._passes.options.slowest
+        lasts = found.excess <= self._launch if self._lands else speed >= slowest
+        chosen = replace(decision, controls=u, feasible=lasts and feet.fits(found), lasting=lasts)
         return replace(chosen, accepted=accepted), chained(first, second)
 
     def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
@@ -190,8 +191,10 @@ class CurvePlanner(Planner):
         self, feet: BetweenFeet, start: Array, wanted: float
     ) -> tuple[Found, SingleSupportPass, Array]:
         """Curve to a liftoff (2, 3), with the first speed at VLO that there is a curve to."""
-        ways = []
-        for speed in self._passes.between(wanted, float(start[0, 1]) if self._lands else 0.0):
+        ways, present = [], float(start[0, 1])
+        if not self._lands:
+            wanted, present = max(wanted, self._passes.options.slowest), 0.0
+        for speed in self._passes.between(wanted, present):
             over = self._passes.at(speed)
             ends = self._passes.approach(over, feet.toes[1])
             found, i = feet.to_liftoff(start, ends, self._lands)

@@ -135,10 +135,13 @@ class Scenario(Checked):
         """True if a segment is a stand."""
         return STAND in self.gaits
 
-    @property
-    def only_walks(self) -> bool:
-        """True if all segments are walks."""
-        return self.gaits == {"walk"}
+    def has_any_speed(self, bears: bool) -> bool:
+        """True if its walk may have any speed of the family, in steps with push-off.
+
+        Args:
+            bears: whether feet bear the centre of pressure around them: then it may stand too.
+        """
+        return self.gaits <= ({"walk", STAND} if bears else {"walk"})
 
     def in_motion(self) -> Scenario | None:
         """The scenario without its stands, from a VLO on; None where nothing is left."""

@@ -5,10 +5,12 @@ import pytest
 
 import template_control as tc
 from template_control.cli.experiment_options import experiment_from
+from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD
 from template_control.errors import ParameterError
 from template_control.run.options import HeadingCommand
 from template_control.run.velocity import VelocityRange, course_at, velocity_route
 from template_control.slip.maps.section import APEX, VLO
+from template_control.slip.similarity import Scale, scaled
 
 ROWS = ((0.0, 0.5, 0.0, 0.0), (2.0, 0.6, 0.05, 0.2))
 PROFILE = tc.run.VelocityProfile(ROWS, duration=5.0)
@@ -128,3 +130,14 @@ def test_a_walk_moves_to_the_side():
     record = tc.simulate(tc.Experiment(robot, steps=16, course=course))
     assert not record.fell, record.fall_reason
     assert record.space_com[-1, 1] == pytest.approx(0.05 * record.time[-1], abs=0.05)
+
+
+@pytest.mark.parametrize(("robot", "tuning"), [("g1", BIPED_AHEAD), ("go2", FREE_AHEAD)])
+def test_robots_that_bear_a_moment_start_to_a_walk_of_any_speed(robot, tuning):
+    """In steps with push-off, as by a velocity; slower too than any gait without."""
+    spec = tc.robot.RobotSpec(robot, free=True)
+    slow = tc.run.GaitSpec(speed=0.4, from_stand=True, to_stand=True)
+    prepared = tc.Experiment(spec, motion=slow, steps=3).prepare()
+    kinds = [segment.gait for segment in prepared.motion.scenario.segments]
+    assert (kinds, prepared.motion.walks) == (["stand", "walk", "stand"], "wp")
+    assert prepared.planner["wp"].options == scaled(tuning, Scale.of(prepared.motion.parameters))
