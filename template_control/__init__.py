@@ -17,7 +17,7 @@ until ``logging`` is configured: ``logging.basicConfig(level=logging.INFO)``.
 
 import logging
 
-from lazy_loader import attach_stub
+from template_control.deprecated import attach_stub
 
 # A library leaves it to its user whether and where its messages are seen.
 logging.getLogger(__name__).addHandler(logging.NullHandler())

@@ -1,5 +1,5 @@
 """The robot's controller: it follows the template that a planner steps ahead."""
 
-from lazy_loader import attach_stub
+from template_control.deprecated import attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

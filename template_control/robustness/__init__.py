@@ -1,5 +1,5 @@
 """Robustness of a robot's walk: disturbances that grow until it falls, and drawn ones."""
 
-from lazy_loader import attach_stub
+from template_control.deprecated import attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -1,5 +1,5 @@
 """Sweeps of any function over a grid or a sample of its arguments, on many processes."""
 
-from lazy_loader import attach_stub
+from template_control.deprecated import attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

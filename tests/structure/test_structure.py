@@ -41,6 +41,7 @@ SHARED = (
     "checks",
     "cholesky",
     "compiled",
+    "deprecated",
     "errors",
     "settings",
     "storage",
