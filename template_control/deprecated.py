@@ -25,6 +25,7 @@ DEPRECATED = {
     "template_control.embedding.StartPlanner": "template_control.embedding:CurvePlanner",
     "template_control.embedding.StopPlanner": "template_control.embedding:CurvePlanner",
     "template_control.load_free_robot": "template_control:load_floating_robot",
+    "template_control.robot.FloatingBasePose": "template_control.robot:Pose",
     "template_control.robot.FREE_ROBOTS": "template_control.robot:FLOATING_ROBOTS",
     "template_control.robot.free_state_in": "template_control.robot:floating_state_in",
     "template_control.robot.FreeBiped": "template_control.robot:FloatingBaseBiped",
