@@ -140,7 +140,7 @@ def targets(folder):
         slip.Segment: {"gait": "walk", "speed": 1.1, "steps": 1},
         slip.Scenario: {"segments": (SEGMENT,)},
         slip.WalkingGait: {
-            "name": "mine", "parameters": P, "vlo": Z, "controls": U, "step_length": 0.5,
+            "name": "mine", "parameters": P, "state": Z, "controls": U, "step_length": 0.5,
             "step_duration": 0.5,
         },
         tc.slip.ActiveRunning: {"parameters": P},

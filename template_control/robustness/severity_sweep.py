@@ -111,9 +111,14 @@ def trial(
 
     Returns:
         fell, reason (of the fall), steps, and speed_error and height_error, None after a fall.
+
+    Raises:
+        ParameterError: if there is no such disturbance.
     """
     if not isinstance(experiment, Experiment):
         experiment = settings.from_table(Experiment, experiment)
+    if disturbance not in _BY_NAME:
+        raise ParameterError(f"disturbance is {disturbance!r}: give one of {', '.join(_BY_NAME)}")
     where = experiment.prepare()
     record = simulate(_BY_NAME[disturbance].experiment(where, level, number))
     errors = (None, None) if record.fell else gait_errors(record, where.gait)

@@ -173,7 +173,7 @@ LONG = {"fig12": 14, "fig8": 5, "fig13": 5, "fig9": 4, "fig10": 3, "fig5": 3}
 LESS = {
     "fig8": {"energies": np.array([824.0, 826.0])},
     "fig9": {"counts": (50, 200)},
-    "fig12": {"planners": ("LQR", "modified, exact map"), "steps": 40},
+    "fig12": {"planners": ("LQR", "modified, exact map"), "steps": 34},
     "fig13": {"steps": 8},
 }
 
@@ -233,7 +233,7 @@ def test_reproduce_command(name, tmp_path, monkeypatch, capfd):
         assert all(walk["spread"][0] < 0.0015 for walk in walks["LQR"].values())
         for planner, by_plant in walks.items():
             for plant, walk in by_plant.items():
-                assert (walk["fall"], walk["steps"]) == (None, 40), (planner, plant)
+                assert (walk["fall"], walk["steps"]) == (None, 34), (planner, plant)
                 # The bound of a walk's settling, 0.1 m/s upward, is 5 degrees here.
                 off = np.abs(np.subtract(walk["mean"], data["target"]))
                 assert np.all(off < (0.008, np.radians(4.98), 2.0)), (planner, plant)

@@ -133,22 +133,17 @@ def test_a_urdf_of_ones_own_starts_where_its_like_does(tmp_path):
 @pytest.mark.slow(seconds=4)
 @pytest.mark.parametrize(("robot", "degrees"), ENDS)
 def test_a_walk_starts_on_the_steepest_ground_of_its_robot(robot, degrees):
-    record = walked(tc.PlantOptions, degrees, steps=16, robot=robot)
-    assert not record.fell, record.fall_reason
+    check(walked(tc.PlantOptions, degrees, steps=16, robot=robot), degrees)
 
 
 @pytest.mark.slow(seconds=4)
-@pytest.mark.parametrize(
-    ("plant", "degrees"),
-    [
-        (tc.PlantOptions, -2.0),
-        (tc.PlantOptions, 3.0),
-        (tc.MujocoOptions, -2.0),
-        (tc.IdealOptions, 3.0),
-    ],
-)
+@pytest.mark.parametrize(("plant", "degrees"), [(tc.MujocoOptions, -2.0), (tc.IdealOptions, 3.0)])
 def test_a_walk_starts_from_a_stand_on_a_slope(plant, degrees):
-    record = walked(plant, degrees)
+    check(walked(plant, degrees), degrees)
+
+
+def check(record, degrees):
+    """Stood on the ground, and walks on its gait in the end."""
     assert not record.fell, record.fall_reason
     assert abs(record.section_state[-1, 0] - record.section_target[-1, 0]) < 0.1
     on_ground = record.foot[0, :, 1] - [sloping(degrees).height_at(x) for x in record.foot[0, :, 0]]

@@ -152,6 +152,11 @@ def test_footholds_of_a_run_are_where_its_feet_bear(robot):
     assert np.diff(holds) == pytest.approx(gait.step_length, rel=0.1)
 
 
+def test_a_trial_of_no_disturbance_is_refused():
+    with pytest.raises(ParameterError, match="disturbance is 'wind': give one of push-forward, "):
+        trial(Experiment(), "wind", 1.0, 0)
+
+
 @pytest.mark.slow(seconds=6)
 def test_trials_of_a_run_succeed_and_know_its_speed():
     good = trial(Experiment(motion=GaitSpec("run", 3.0)), "step-down", 0.01, 1)

@@ -136,7 +136,7 @@ def test_a_lost_dask_cluster_ends_the_sweep_with_what_is_safe(dask, tmp_path, lo
 
 
 def test_a_study_is_the_same_on_dask(dask):
-    study = Study(experiment={"steps": 1}, grid={"delay": (0.0, 0.002)}, figures=("mean_speed",))
+    study = Study(experiment={"steps": 1}, grid={"delay": (0.002,)}, figures=("mean_speed",))
     with ThreadPoolExecutor(1) as thread:
         alone = run_study(study, executor=thread)
     spread = run_study(study, executor=dask.get_executor())
