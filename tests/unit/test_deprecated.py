@@ -23,6 +23,7 @@ OLD_NAMES = {
     "template_control.embedding.StartPlanner",
     "template_control.embedding.StopPlanner",
     "template_control.load_free_robot",
+    "template_control.robot.FloatingBasePose",
     "template_control.robot.FREE_ROBOTS",
     "template_control.robot.free_state_in",
     "template_control.robot.FreeBiped",
