@@ -152,8 +152,6 @@ def targets(folder):
         slip.SteadyRoute: {"parameters": P, "stride": "w", "target": Z},
         tc.ScenarioRoute: {"scenario": SCENARIO},
         slip.Family: {"parameters": P, "stride": "w", "fixed": held},
-        slip.WalkingFamily: {"gait": GAIT},
-        slip.RunningFamily: {"gait": RUN},
         tc.RunningPlanner: {"gait": RUN},
         embedding.Lean: {"speeds": (2.0, 3.0), "pitches": (0.3, 0.4)},
         run.GaitSpec: {"name": "run"},

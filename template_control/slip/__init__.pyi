@@ -40,13 +40,11 @@ from .gaits.gait import without_push_off as without_push_off
 from .gaits.gait_branch import ControlledFamily as ControlledFamily
 from .gaits.gait_branch import Family as Family
 from .gaits.gait_branch import controlled_fixed_point as controlled_fixed_point
-from .gaits.running_gait import RunningFamily as RunningFamily
 from .gaits.running_gait import RunningGait as RunningGait
 from .gaits.running_gait import running_gait as running_gait
 from .gaits.running_gait import running_speeds as running_speeds
 from .gaits.slope_gait import on_slope as on_slope
 from .gaits.walking_by_speed import SpeedFamily as SpeedFamily
-from .gaits.walking_by_speed import WalkingFamily as WalkingFamily
 from .gaits.walking_by_speed import gait_for_speed as gait_for_speed
 from .gaits.walking_by_speed import walking_by_speed as walking_by_speed
 from .gaits.walking_by_speed import walking_gait as walking_gait

@@ -39,9 +39,9 @@ from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.gaits.gait import WalkingGait, control_units, vlo_jacobians
+from template_control.slip.gaits.gait import GaitFamily, WalkingGait, control_units, vlo_jacobians
 from template_control.slip.gaits.slope_gait import on_slope
-from template_control.slip.gaits.walking_by_speed import WalkingFamily
+from template_control.slip.gaits.walking_by_speed import other_walks
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import (
@@ -171,7 +171,7 @@ class LqrPlanner(Planner):
         self._scale = Scale.of(gait.parameters)
         self.options = scaled(options or LqrOptions(), self._scale)
         self.offset: Array = np.zeros(3)
-        self._family = WalkingFamily(gait)
+        self._family = GaitFamily(gait, other_walks)
         self._scratch = new_scratch()
         self._pushes = int(Slot.K_PUSH) in control_units(gait)[0]
         self._slope = 0.0

@@ -15,8 +15,8 @@ from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, S
 from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.gaits.gait import WalkingGait, without_push_off
-from template_control.slip.gaits.walking_by_speed import WalkingFamily
+from template_control.slip.gaits.gait import GaitFamily, WalkingGait, without_push_off
+from template_control.slip.gaits.walking_by_speed import other_walks
 from template_control.slip.maps.return_map import closed_form
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
@@ -60,7 +60,7 @@ class ModifiedPlanner(Planner):
         gait = without_push_off(gait)
         self.gait = gait
         self.options = scaled(options or ModifiedOptions(), Scale.of(gait.parameters))
-        self._family = WalkingFamily(gait)
+        self._family = GaitFamily(gait, other_walks)
         self._scratch = new_scratch()
         self._kernel = stride_kernel(gait.parameters, StrideKind.WALK)
         k0 = gait.parameters.leg_stiffness

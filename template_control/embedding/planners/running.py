@@ -25,7 +25,8 @@ from template_control.slip.control.stride_solver import (
     solve_within_reach,
     whole,
 )
-from template_control.slip.gaits.running_gait import RunningFamily, RunningGait
+from template_control.slip.gaits.gait import GaitFamily
+from template_control.slip.gaits.running_gait import RunningGait, other_runs
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
@@ -140,7 +141,7 @@ class RunningPlanner(Planner):
         self._scale = Scale.of(gait.parameters)
         self.options = scaled(options or RunningOptions(), self._scale)
         self.offset: Array = np.zeros(PADDED)
-        self._family = RunningFamily(gait)
+        self._family = GaitFamily(gait, other_runs)
         self._map = ReturnMap(gait.parameters, gait.stride)
         o = self.options
         self._grid = 0.5 * o.pace
@@ -160,7 +161,7 @@ class RunningPlanner(Planner):
         """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
         z, target, angles, cause, begun = context
         if target is not None and target[0] != self.gait.apex[0]:
-            self.gait = self._family.at(float(target[0]))
+            self.gait, _ = self._family.towards(self.gait, target)
         wanted = self.gait.apex if target is None else target
         near = self._near(z, wanted)
         goal, at_target = self._aim(z, wanted)
@@ -197,8 +198,9 @@ class RunningPlanner(Planner):
     def _near(self, z: Array, wanted: Array) -> RunningGait:
         """The gait about which the controls change, near the present speed."""
         if abs(wanted[0] - z[0]) <= self.options.pace:
-            return self._family.at(float(wanted[0]))
-        return self._family.at(self._grid * round(float(z[0]) / self._grid))
+            return self._family.towards(self.gait, wanted)[0]
+        near = self._grid * round(float(z[0]) / self._grid)
+        return self._family.towards(self.gait, [near])[0]
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""

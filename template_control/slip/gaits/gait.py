@@ -6,9 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from template_control.arrays import Array
@@ -295,3 +296,43 @@ def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
     )
     flies = [node.phase is Phase.F for node in automaton.nodes]
     return float(sum(row[1] for row in stride.meta if flies[int(row[2])]) / stride.duration)
+
+
+G = TypeVar("G", bound=Gait)
+Others = Callable[[G], tuple[float, float, Callable[[SlipParameters, float], G]]]
+"""Range of speeds at the section [m/s], and maker, of the gaits that a gait may give way to."""
+
+_SAME = 1e-9  # of sqrt(g l0): speeds that are one
+
+
+class GaitFamily(Generic[G]):
+    """The gaits that a planner's targets stand for, which are those with their speeds.
+
+    ``gait`` is the planner's own; ``others`` says which gaits any of them may give way to.
+    """
+
+    def __init__(self, gait: G, others: Others[G]) -> None:
+        self._known, self._others = [gait], others
+
+    def reset(self) -> G:
+        """Forget all gaits but the planner's own, which is returned."""
+        del self._known[1:]
+        return self._known[0]
+
+    def towards(self, present: G, target: ArrayLike | None) -> tuple[G, bool]:
+        """The gait with the target's speed at the section, or the nearest there is.
+
+        The ``present`` one is kept where it has that speed. Of the target (n,) at the section dx/dt
+        counts [m/s]; None: the present gait's. Returns the gait, and whether it has that speed.
+        """
+        if target is None:
+            return present, True
+        same, wanted = _SAME * present.parameters.speed_unit, float(np.asarray(target)[0])
+        for gait in (present, *self._known):
+            if abs(gait.state[0] - wanted) <= same:
+                return gait, True
+        low, high, make = self._others(present)
+        speed = min(max(wanted, low), high)
+        gait = make(present.parameters, speed)
+        self._known.append(gait)
+        return gait, abs(speed - wanted) <= same

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -164,35 +166,6 @@ def _symmetric_angle(
     return None
 
 
-class RunningFamily:
-    """The gaits that a planner's targets stand for, with heights and stiffnesses by speed.
-
-    Args:
-        gait: the planner's own.
-    """
-
-    @checked
-    def __init__(self, gait: RunningGait) -> None:
-        self._known = [gait]
-
-    def reset(self) -> RunningGait:
-        """Forget all gaits but the planner's own, which is returned."""
-        del self._known[1:]
-        return self._known[0]
-
-    def at(self, speed: float) -> RunningGait:
-        """The gait with this speed at apex, or the nearest there is.
-
-        Args:
-            speed: dx/dt at apex [m/s].
-        """
-        p = self._known[0].parameters
-        same = _SAME * p.speed_unit
-        for gait in self._known:
-            if abs(gait.apex[0] - speed) <= same:
-                return gait
-        stride = self._known[0].stride
-        low, high = running_speeds(p, stride)
-        gait = running_gait(p, min(max(speed, low), high), stride=stride)
-        self._known.append(gait)
-        return gait
+def other_runs(gait: RunningGait) -> tuple[float, float, Callable[..., RunningGait]]:
+    """See :data:`~.gait.Others`: runs, or hops, with heights and stiffnesses by speed."""
+    return *running_speeds(gait.parameters, gait.stride), partial(running_gait, stride=gait.stride)

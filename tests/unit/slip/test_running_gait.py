@@ -9,8 +9,8 @@ from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import flight_share
-from template_control.slip.gaits.running_gait import RunningFamily, running_gait, running_speeds
+from template_control.slip.gaits.gait import GaitFamily, flight_share
+from template_control.slip.gaits.running_gait import other_runs, running_gait, running_speeds
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
 
@@ -106,10 +106,14 @@ def test_a_gait_that_is_none_is_refused():
 
 def test_a_family_knows_its_gait_and_the_nearest():
     own = running_gait(P, 3.0, apex_height=0.98, leg_stiffness=22e3)
-    family = RunningFamily(own)
-    assert family.at(3.0) is own
-    assert family.at(2.5) is family.at(2.5)
-    assert family.at(9.0).apex[0] == running_speeds(P)[1]
+    family = GaitFamily(own, other_runs)
+    assert family.towards(own, [3.0]) == (own, True)
+    slower, exact = family.towards(own, [2.5])
+    assert exact
+    assert family.towards(own, [2.5])[0] is slower
+    fastest, exact = family.towards(slower, [9.0])
+    assert not exact
+    assert fastest.apex[0] == running_speeds(P)[1]
 
 
 def test_flight_is_what_the_nodes_without_a_foot_take(paper_gait):
