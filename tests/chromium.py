@@ -130,7 +130,7 @@ class Tab:
         self._socket.close()
 
 
-def until(holds, what, seconds=30.0):
+def until(holds, what, seconds=90.0):
     """Wait until something holds; its value."""
     end = time.monotonic() + seconds
     while not (found := holds()):
