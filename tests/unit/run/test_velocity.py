@@ -141,3 +141,19 @@ def test_robots_that_bear_a_moment_start_to_a_walk_of_any_speed(robot, tuning):
     kinds = [segment.gait for segment in prepared.motion.scenario.segments]
     assert (kinds, prepared.motion.walks) == (["stand", "walk", "stand"], "wp")
     assert prepared.planner["wp"].options == scaled(tuning, Scale.of(prepared.motion.parameters))
+
+
+def test_the_planner_of_a_robots_own_walk_looks_ahead_on_soles():
+    """A walk of another touchdown angle is that of its own gait."""
+
+    def planner(robot, **gait):
+        spec = tc.robot.RobotSpec(robot, free=True)
+        return tc.Experiment(spec, motion=tc.run.GaitSpec(speed=0.6, **gait)).resolved().planner
+
+    assert planner("g1") == BIPED_AHEAD
+    assert planner("g1", touchdown_angle=70.0).kind == planner("bolt").kind == "lqr"
+
+
+def test_a_planner_that_is_named_has_the_tuning_of_the_robots_kind(understood):
+    line = understood("template-control walk --robot g1 --floating-base --planner ahead")
+    assert experiment_from(line, tc.Experiment()).planner == BIPED_AHEAD
