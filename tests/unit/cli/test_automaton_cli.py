@@ -143,6 +143,7 @@ def test_description_survives_json(automaton):
 @pytest.mark.slow(seconds=5)
 def test_table_names_every_node_guard_and_failure(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.delenv("COLUMNS", raising=False)  # pytest's workers have one: names would wrap
     assert main(["automaton"]) == 0
     assert (tmp_path / "runs" / "automaton.png").read_bytes().startswith(b"\x89PNG")
     out = capsys.readouterr().out
