@@ -180,10 +180,23 @@ class Biped(Robot):
         self.heading_frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
         self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
         self._sources = sources(model, data, self._foot_ids, self._joint_limits)
+        if flat:
+            self._stop_knees()
         self._take_patches()
         self._look()
         self.spread: Array = np.zeros((len(feet), 2))
         self._prepare()
+
+    def _stop_knees(self) -> None:
+        """Let the knees stop where the leg is straight.
+
+        One that bends backward, as G1's may by 0.09 rad, is trapped: the CoM can only sink after
+        it has risen.
+        """
+        straight = self._neutral[-len(self.joint_stops) :]
+        for _, knee, _ in self.hinges:
+            beyond = np.argmin(np.abs(self.joint_range[knee] - straight[knee]))
+            self.joint_stops[knee, beyond] = straight[knee]
 
     def _take_patches(self) -> None:
         """Write what is constant of the soles."""

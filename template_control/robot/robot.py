@@ -56,6 +56,8 @@ class Robot(ABC):
         torque_limit: (nu,) URDF ``effort`` [N m].
         velocity_limit: (nu,) URDF ``velocity`` [rad/s].
         joint_range: (nu, 2) URDF ``lower`` and ``upper`` [rad].
+        joint_stops: (nu, 2) angles before which joints are brought to rest, within that range
+            [rad].
         joint_damping: (nu,) URDF ``damping``: viscous [N m s/rad].
         joint_friction: (nu,) URDF ``friction``: dry, at most this much [N m]. Plants have it; no
             term of the model does.
@@ -102,6 +104,7 @@ class Robot(ABC):
         self.joint_angle, self.joint_velocity = j.joints
         limits = (self.velocity_limit, *self.joint_range.T, self.joint_damping)
         self._joint_limits = np.vstack(limits)
+        self.joint_stops: Array = self._joint_limits[1:3].T
 
     def __repr__(self) -> str:
         joints = ", ".join(self.joint_names)

@@ -186,7 +186,7 @@ def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) 
     is too fast may stay so.
     """
     o, limit = options, robot.velocity_limit
-    place, speed, (low, high) = robot.joint_angle, robot.joint_velocity, robot.joint_range.T
+    place, speed, (low, high) = robot.joint_angle, robot.joint_velocity, robot.joint_stops.T
     down = np.minimum((place - low) / o.stop_horizon, limit)
     up = np.minimum((high - place) / o.stop_horizon, limit)
     bounds[1] = np.maximum((up - speed) / o.speed_horizon, slack)

@@ -169,6 +169,24 @@ def test_talos_has_its_joints_in_another_order():
     assert 0.85 < talos.sway < 0.9
 
 
+@pytest.mark.parametrize("name", ["g1", "talos"])
+def test_a_knee_stops_where_its_leg_is_longest(name):
+    robot = load_floating_robot(name)
+    model, data, q = robot.model, robot.model.createData(), robot.neutral()
+    for hip, knee, ankle in robot.hinges:
+        stop, bent = robot.joint_stops[knee]
+        urdf = robot.joint_range[knee]
+        assert urdf[0] <= stop < bent == urdf[1]
+
+        def length(angle, hip=hip, knee=knee, ankle=ankle):
+            q[robot.nq - len(robot.joint_names) + knee] = angle
+            pin.forwardKinematics(model, data, q)
+            ends = [data.oMi[2 + joint].translation for joint in (hip, ankle)]
+            return np.linalg.norm(np.subtract(*ends))
+
+        assert length(stop) == pytest.approx(max(map(length, np.linspace(*urdf, 2001))), abs=1e-6)
+
+
 def test_the_sway_ratio_is_that_of_a_sway(g1):
     """Soles and attitude of the trunk rest, and the CoM moves to the left."""
     q = g1.bent()
