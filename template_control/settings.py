@@ -48,10 +48,7 @@ _SCALARS = {
 
 
 def read(kind: type[T], path: str | Path) -> T:
-    """A dataclass from a TOML file; keys that are left out keep their defaults.
-
-    A ParameterError names the file and the key.
-    """
+    """A dataclass from a TOML file; a ParameterError names the file and the key."""
     try:
         table = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:

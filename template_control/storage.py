@@ -268,10 +268,7 @@ def writing(folder: Path) -> Iterator[Path]:
 
 
 def take_lock(descriptor: int) -> bool:
-    """Take the lock of an open file, which the system frees when its holder ends.
-
-    False while another process holds it; True also where the file system knows no locks.
-    """
+    """Take the lock of an open file; False while another process holds it."""
     try:
         return lock_descriptor(descriptor, blocking=False)
     except OSError:

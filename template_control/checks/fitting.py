@@ -41,10 +41,7 @@ def shown(value: Any) -> str:
 
 
 def inward(low: float, high: float) -> str:
-    """A range for a message, rounded so that both ends that are printed lie in it.
-
-    The larger end has three digits.
-    """
+    """A range for a message, of about three digits, rounded so that both ends lie in it."""
     size = max(abs(low), abs(high))
     step = 10.0 ** (math.floor(math.log10(size)) - 2) if size > 0.0 else 1.0
     first, last = math.ceil(low / step - 1e-9) * step, math.floor(high / step + 1e-9) * step

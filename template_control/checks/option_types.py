@@ -20,10 +20,7 @@ MANY = Range(1, 1_000_000)
 
 
 def number(within: Range) -> Callable[[str], float]:
-    """The ``type`` of an option that is a number in a range, in the unit that the user types.
-
-    It refuses other texts in words that follow the option's name.
-    """
+    """The ``type`` of an option that is a number in a range, in the unit that the user types."""
     return partial(_read, hint=Annotated[float, within])
 
 

@@ -54,10 +54,7 @@ def _plain(end: float) -> str:
 
 
 class Shape(NamedTuple):
-    """Size of an array of numbers along its axes; None stands for any.
-
-    An Ellipsis at the beginning of ``sizes`` stands for any axes; ``finite`` refuses NaN and inf.
-    """
+    """Size of a finite array along its axes; None is any, an Ellipsis first any number of axes."""
 
     sizes: tuple[int | EllipsisType | None, ...]
     finite: bool = True

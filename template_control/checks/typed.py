@@ -10,10 +10,7 @@ from template_control.errors import ParameterError
 
 
 def parsed(text: str, hint: Any) -> Any:
-    """Number that a text holds; Refused says "is ...: give ...", to follow the number's name.
-
-    ``hint`` is float or int, maybe ``Annotated`` with a :class:`~.ranges.Range` in the unit typed.
-    """
+    """Number that a text holds; Refused says "is ...: give ...", to follow the number's name."""
     kind = get_args(hint)[0] if get_origin(hint) is Annotated else hint
     try:
         value = kind(text)
@@ -34,11 +31,7 @@ def number(where: str, text: str, hint: Any) -> Any:
 
 
 def entries(where: str, texts: Iterable[str], form: str) -> dict[str, str]:
-    """Values by key of entries ``key=value``.
-
-    A ParameterError names the line by ``where`` if an entry has no equals sign (``form`` says what
-    one looks like), or a key comes twice.
-    """
+    """Values by key of entries ``key=value``, of which ``form`` says what one looks like."""
     found: dict[str, str] = {}
     for text in texts:
         key, equals, value = text.rpartition("=")

@@ -57,10 +57,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def save(automaton: Automaton, path: Path) -> Path:
-    """Draw an automaton into a file; folders on the way to it are made.
-
-    A ParameterError if the suffix is none of .png, .svg and .pdf.
-    """
+    """Draw an automaton into a file; folders on the way to it are made."""
     _check(path)
     return save_figure(automaton_figure(automaton), path, dpi=100)
 
@@ -124,10 +121,7 @@ def _row(node: Node) -> list[str]:
 
 
 def _way(edge: Edge) -> str:
-    """``"G_t^w touchdown -> DS_sc^w (place front)"``; a section says it ends the stride.
-
-    A failure says why.
-    """
+    """An edge, such as ``"G_t^w touchdown -> DS_sc^w (place front)"``; a failure says why."""
     if isinstance(edge.target, Outcome):
         return f"{words(edge.event)}: {edge.target.reason}"
     notes = [words(edge.reset)] if edge.reset is not Reset.NONE else []

@@ -64,10 +64,7 @@ class _Key(argparse.Action):
 
 
 def experiment_from(options: argparse.Namespace, default: Experiment) -> Experiment:
-    """The experiment that was asked for; ``default`` holds where no option or file says otherwise.
-
-    A TemplateControlError names the option or the key that is wrong.
-    """
+    """The experiment that was asked for; ``default`` holds where nothing says otherwise."""
     base = default if options.config is None else Experiment.load(options.config)
     given: dict[str, Any] = {}
     for flag in ALL:

@@ -162,10 +162,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _wanted(options: argparse.Namespace) -> _Wanted | None:
-    """The branch that was asked for; None for the family by speed.
-
-    A ParameterError names the option that is out of its range or does not fit another.
-    """
+    """The branch that was asked for; None for the family by speed."""
     if options.family:
         idle = [n for n in ("fix", "controlled", "start", "limits") if getattr(options, n)]
         if idle:
@@ -307,10 +304,7 @@ _TABLE_STEP = 0.1  # [m/s]
 
 
 def make_family(folder: Path | None, as_json: bool) -> int:
-    """Search the family, write ``walking.json`` and its figure, print a table; the exit status.
-
-    Without a folder no file is written; ``as_json`` prints the family instead of the table.
-    """
+    """Search the family, write its file and figure into a folder, if any, and print it."""
     files, chains = Files(), search_family()
     data = family_data(chains)
     paths: list[Path | None] = []

@@ -72,21 +72,14 @@ class _Version(argparse.Action):
 
 
 class _Parser(argparse.ArgumentParser):
-    """Takes a word like ``-20@4`` for an option's value: no option begins with a digit.
-
-    argparse does so with plain negative numbers only.
-    """
+    """Takes a word like ``-20@4`` for a value, as argparse does plain negative numbers only."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As :meth:`argparse.ArgumentParser.parse_known_args`."""
         return super().parse_known_args(_with_values(args), namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Refuse the words in one line, as a ParameterError.
-
-        ``message`` is argparse's, or that of a type of
-        :mod:`~template_control.checks.option_types`, whose words follow the option's name.
-        """
+        """Refuse the words in one line; those of our own types follow the option's name."""
         option, ours, reason = re.sub(r"^argument (\S+): ", r"\1: ", message).partition(": is ")
         if ours:
             raise ParameterError(f"{option} is {reason}")
@@ -106,11 +99,7 @@ def all_actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
 
 
 def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """The parser for ``arguments``.
-
-    It lists every command, but has the options of the one command that ``arguments`` name:
-    importing them all would take seconds, even for ``--help``.
-    """
+    """The parser for ``arguments``, with the options of the one command that they name."""
     # Before the command there are only options without a value.
     wanted = next((word for word in arguments if not word.startswith("-")), None)
     return _parser({wanted})
@@ -233,10 +222,7 @@ class _Standard(io.FileIO):
 
 
 def _standard_streams() -> _Standard:
-    """Open what is closed: a file would take its place, and what is printed with it.
-
-    No character is one too many for the streams, whatever the locale. Returns standard output's.
-    """
+    """Open what is closed, as a file would take its place, and replace what is not encoded."""
     for descriptor in range(_STDERR + 1):
         try:
             os.fstat(descriptor)

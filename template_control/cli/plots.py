@@ -75,10 +75,7 @@ def _names(text: str) -> list[str]:
 def draw(
     options: argparse.Namespace, record: Record, folder: Path, template: ScenarioRecord | None
 ) -> list[Path]:
-    """Draw a run's figures as the options say; returns their files.
-
-    ``template`` is the same scenario on the robot's template, of a run that has one.
-    """
+    """Draw a run's figures, and its template's in the same scenario, as the options say."""
     look = Look(options.start, options.end, not options.no_title)
     how = {"dpi": options.dpi, "look": look, "file_format": options.format}
     return save_figures(record, folder, figures=options.figures, template=template, **how)

@@ -41,10 +41,7 @@ def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
 
 @contextmanager
 def output_folder(folder: Path) -> Iterator[Path]:
-    """Keep a folder for a run, see :func:`~template_control.storage.writing`.
-
-    Says on stderr if a run in it will be replaced.
-    """
+    """Keep a folder for a run; says on stderr if a run in it will be replaced."""
     with writing(folder):
         if (folder / "run.npz").exists():
             notice(f"the run in {folder} will be replaced; --output keeps both")
@@ -111,11 +108,7 @@ def run_and_keep(
 
 
 def _give_up(error: Exception, experiment: Experiment, folder: Path) -> NoReturn:
-    """Keep what a run had recorded when an error ended it, and raise the error.
-
-    Of an error that is not this library's the traceback is printed: it leads into the user's own
-    code.
-    """
+    """Keep what a run had recorded when an error ended it, and raise the error in one line."""
     record, files = recorded(error), Files()
     line = one_line(error) if record is None else record.error
     if record is not None:
@@ -259,10 +252,7 @@ NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in 
 
 
 def add_template(figures: dict[str, Any], record: Record, template: ScenarioRecord) -> None:
-    """Add to a run's figures how it ended and its top speed, and the same of its template.
-
-    ``template`` is the record of the same scenario on the robot's template; SI units.
-    """
+    """Add to a run's figures how it ended and its top speed, and the same of its template."""
     error = template.section_state[1:, 0] - template.wanted_speed
     figures["completed"] = bool(record.arrived)
     figures["top_speed"] = float(record.section_state[:, 0].max())

@@ -91,10 +91,7 @@ def report_trials(
     trials: Callable[[Executor], T],
     report: Callable[[T, Files], Report],
 ) -> int:
-    """Make trials on worker processes and report on them; the exit status, 130 after Ctrl-C.
-
-    ``report`` may write more files into the folder.
-    """
+    """Make trials on worker processes and report on them; the exit status."""
     try:
         with workers(options.workers) as pool, stdout_to_stderr():
             found = trials(pool)

@@ -33,10 +33,7 @@ class BaseFilterOptions(Checked):
 
 
 class PlanarTrunk:
-    """Place and rotation of a planar robot's trunk.
-
-    d are the directions, 2 in the plane, a the axes about which the trunk turns, 1 in the plane.
-    """
+    """A planar robot's trunk, with d = 2 directions and a = 1 axis about which it turns."""
 
     axes = 1
 
@@ -58,10 +55,7 @@ class PlanarTrunk:
         return np.array([[up], [-forward]])
 
     def rolled(self, q: Array) -> Array:
-        """(n, d) by how much the spheres of the feet have rolled on [m].
-
-        The robot has been updated with ``q`` (nq,).
-        """
+        """(n, d) by how much the feet's spheres have rolled on [m]; ``q`` is the robot's update."""
         robot = self._robot
         angle = robot.foot_turning[: len(robot.feet)] @ q
         return np.stack((robot.foot_radius * angle, np.zeros(len(angle))), axis=1)

@@ -49,11 +49,7 @@ class JointFilter:
         self.angle, self.speed = angle.copy(), speed.copy()
 
     def update(self, measured: Array, acceleration: Array, dt: float) -> None:
-        """Advance the estimate by one tick of dt [s].
-
-        ``measured`` (nu,) are the encoders' angles [rad], ``acceleration`` (nu,) is expected since
-        the tick before [rad/s^2].
-        """
+        """Advance by dt [s] with angles (nu,) [rad] and expected accelerations (nu,) [rad/s^2]."""
         alpha, beta = self._gains(dt)
         angle = self.angle + (self.speed + 0.5 * acceleration * dt) * dt
         speed = self.speed + acceleration * dt
@@ -157,20 +153,14 @@ class NoiseFilter:
 
 
 class _Pair:
-    """Covariance of a position and its speed, both measured at every tick.
-
-    ``deviation`` (2,) are the standard deviations of the measurements.
-    """
+    """Covariance of a position and its speed, measured with the standard deviations (2,)."""
 
     def __init__(self, deviation: Array) -> None:
         self._noise = np.diag(deviation**2)
         self._covariance = self._noise.copy()
 
     def gain(self, lacking: float, dt: float) -> Array:
-        """(2, 2) gain of a tick's measurement, dt [s] after the last one.
-
-        ``lacking`` is the standard deviation of the accelerations since then.
-        """
+        """(2, 2) gain after dt [s] with the standard deviation of the accelerations in it."""
         flow, entry = np.array([[1.0, dt], [0.0, 1.0]]), np.array([0.5 * dt**2, dt])
         ahead = flow @ self._covariance @ flow.T + lacking**2 * np.outer(entry, entry)
         gain = np.linalg.solve(ahead + self._noise, ahead).T

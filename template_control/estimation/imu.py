@@ -122,11 +122,7 @@ class ImuOptions(Checked):
 
 
 class ImuSensors:
-    """Simulated sensors of a robot and its state estimate, which starts at the true state.
-
-    The robot's last update is overwritten; ``scale`` is its template's, ``time_step`` the ticks'
-    [s].
-    """
+    """Simulated sensors of a robot and its state estimate, which starts at the true state."""
 
     exact = False
 

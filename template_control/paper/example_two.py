@@ -107,11 +107,7 @@ def states_figure(
     plants: tuple[str, ...],
     target: Array,
 ) -> Figure:
-    """y, phi and E at VLO over the steps: a row of panels for each plant, a line for each planner.
-
-    ``states`` are (steps + 1, 3) y [m], phi [rad], E [J] by (planner, plant), of which some may
-    lack; ``target`` (3,) are those of the equilibrium. Names are in the order they are drawn in.
-    """
+    """y, phi and E at VLO (steps + 1, 3) over the steps: a row a plant, a line a planner."""
     figure = Figure(figsize=(9.5, 1.7 * len(plants) + 0.6), layout="constrained")
     panels = figure.subplots(len(plants), 3, sharex=True, sharey="col", squeeze=False)
     unit = np.array([1.0, 180.0 / np.pi, 1.0])
@@ -141,11 +137,7 @@ def states_figure(
 
 
 def liftoff_figure(settled: Record, records: dict[str, Record]) -> Figure:
-    """CoM of a settled walk, and torques of a first step with each liftoff rule.
-
-    A step is shown from touchdown to touchdown: one of the last of ``settled``, which ends on its
-    gait. ``records`` are at most five runs by the name of their liftoff rule, with every sample.
-    """
+    """CoM in a step of a settled walk, and torques of a first step with each liftoff rule."""
     figure = Figure(figsize=(9.0, 2.2 * (len(records) + 1)), layout="constrained")
     panels = figure.subplots(len(records) + 1, 1)
     begin, _, end = _step(settled, len(settled.section_time) - 3)
@@ -227,10 +219,7 @@ def start_state(gait: WalkingGait) -> tuple[float, float, float]:
 
 
 def sections(gait: WalkingGait, z: Array) -> Array:
-    """(n, 3) y [m], phi [rad, positive downward], E [J] of VLO states, by the template's formulas.
-
-    ``z`` (n, 3) are dx/dt, y, dy/dt [m/s, m, m/s].
-    """
+    """(n, 3) y [m], phi [rad, positive downward], E [J] of VLO states (n, 3) dx/dt, y, dy/dt."""
     energy = np.asarray(VLO.energy(gait.parameters, z))
     return np.column_stack((z[:, 1], velocity_angle(z), energy))
 
@@ -238,12 +227,7 @@ def sections(gait: WalkingGait, z: Array) -> Array:
 def robot_walk(
     planner: str, plant: str, steps: int = STEPS, beta: float | None = None
 ) -> tuple[Walk, Record]:
-    """Walk of the five-link robot from z_0: VLO states, and the whole record.
-
-    Planner and plant are keys of :data:`PLANNERS` and :data:`PLANTS`; ``steps`` are how many at
-    most. ``beta`` is a predefined liftoff direction, from forward horizontal [rad]; None for the
-    template's.
-    """
+    """Walk and record from z_0; ``beta`` [rad] is a predefined liftoff direction, or None."""
     gait = _gait()
     world, tuning = PLANTS[plant]
     record = simulate(
@@ -260,10 +244,7 @@ def robot_walk(
 
 
 def template_walk(planner: str, steps: int = STEPS) -> Walk:
-    """Walk of the template itself from z_0, integrated exactly, with a planner of the robot's.
-
-    Arguments as for :func:`robot_walk`.
-    """
+    """As :func:`robot_walk`, of the template itself, integrated exactly."""
     gait = _gait()
     chooses, step = PLANNERS[planner](gait), ReturnMap(gait.parameters)
     states, fall = [np.array(start_state(gait))], ""
@@ -307,10 +288,7 @@ def _numbers(walk: Walk) -> dict[str, Any]:
 
 
 def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Reproduction:
-    """States on which the robot settles from z_0, by planner and by plant.
-
-    They are those of the last 20 of each walk's steps.
-    """
+    """States on which the robot settles in the last 20 steps from z_0, by planner and by plant."""
     plants, first = (ALONE, *PLANTS), planners[0]
     # What full grip changes is the robot's, whatever its planner.
     cases = [

@@ -54,11 +54,7 @@ class Grid:
 
 @dataclass(frozen=True)
 class MapErrors:
-    """Errors of one map over the valid runs; NaN where the step fails on the map.
-
-    ``position`` (n,) is e of (31) at the next VLO [%], ``velocity`` (n,) script E of (32) [%];
-    ``failed`` is the number of valid runs in which the map's step fails.
-    """
+    """Errors e of (31) and E of (32) [%] of one map, NaN in the steps that fail on it."""
 
     position: Array
     velocity: Array
@@ -78,10 +74,7 @@ class MapErrors:
 
 @dataclass(frozen=True)
 class ErrorStudy:
-    """Result of :func:`study`: errors by map, and d_v of (33) of the valid runs, ``distance`` (n,).
-
-    ``tried`` is the number of states on the grid.
-    """
+    """Errors by map, and d_v of (33) of the valid runs, ``distance`` (n,), of those tried."""
 
     tried: int
     distance: Array
@@ -94,11 +87,7 @@ class ErrorStudy:
 
 
 def study(grid: Grid | None = None) -> ErrorStudy:
-    """Compare the closed-form VLO maps with the exact one over a grid.
-
-    A run is valid if the exact step completes and its energy allows the next touchdown, (29) and
-    (30). The grid replaces the stiffness of the template, which is Table IV's.
-    """
+    """Errors of the closed-form VLO maps where the exact step completes, with (29) and (30)."""
     p = SlipParameters()
     z, u = (grid or Grid()).states(p)
     tried = len(z)
@@ -131,11 +120,7 @@ _COLORS = ("#db7321", "#2a6196", "#6b7078", "#3a9a4a")
 
 
 def error_figure(edges: Array, counts: Array, means: Mapping[str, tuple[Array, Array]]) -> Figure:
-    """Mean errors binned over d_v, with the number of runs in each bin.
-
-    ``edges`` (b + 1,) are the bins', ``counts`` (b,) the runs'; ``means`` are, by map, (b,) mean
-    position and velocity errors [%].
-    """
+    """Mean errors [%] by map (b,), binned over d_v with edges (b + 1,), and the runs' counts."""
     figure = Figure(figsize=(9.0, 3.6), layout="constrained")
     centres, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     for panel, (axes, label) in enumerate(
@@ -161,11 +146,7 @@ def stride_figure(
     events: Sequence[tuple[str, float, float]],
     title: str,
 ) -> Figure:
-    """A stride's CoM path with its legs at the events.
-
-    ``paths`` are label and (n, 2) x, y [m]; ``legs`` toe and CoM (2,) of each leg drawn; ``events``
-    name, x and y.
-    """
+    """A stride's CoM paths (n, 2), its legs (toe, CoM), and its events with x and y [m]."""
     figure = Figure(figsize=(9.0, 4.0), layout="constrained")
     axes = figure.subplots()
     for toe, com in legs:

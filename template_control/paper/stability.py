@@ -43,10 +43,7 @@ _ROUNDS = 100  # of the search for controls, at most
 
 @dataclass(frozen=True)
 class DeadbeatSet:
-    """States from which one exact step leads onto an equilibrium.
-
-    ``state`` (n, 3) is at VLO; ``controls`` (n, NUM_SLOTS) are those of that step.
-    """
+    """States (n, 3) at VLO, with controls whose exact step leads onto an equilibrium."""
 
     state: Array
     controls: Array
@@ -86,10 +83,7 @@ def backward_set(gait: WalkingGait, counts: tuple[int, int] = (60, 180)) -> Dead
 
 
 def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Array:
-    """(n, 3) VLO states after one exact step with the controls of a map; NaN where it fails.
-
-    The search for controls begins at the exact step's; they aim at the equilibrium ``gait``.
-    """
+    """(n, 3) VLO states after an exact step with a map's controls; NaN where it fails."""
     p, k0 = gait.parameters, gait.parameters.leg_stiffness
     slots, step = [int(Slot.TOUCHDOWN_ANGLE), int(Slot.K_SD)], ReturnMap(p, StrideKind.WALK, kind)
     others = np.array([[1.0, k0], [0.0, 0.5 * k0], [0.5 * np.pi, 1.5 * k0]])
@@ -250,10 +244,7 @@ def fig8(energies: Array = _ENERGIES) -> Reproduction:
 
 
 def fig9(counts: tuple[int, int] = (100, 400)) -> Reproduction:
-    """The one-step deadbeat set, and the share of it that each map's controller saves.
-
-    ``counts`` as for :func:`backward_set`.
-    """
+    """The one-step deadbeat set, and the share of it that each map's controller saves."""
     gait = equilibrium()
     stable = [p for p in branch(_FINE) if p.kind is Kind.STABLE]
     found = backward_set(gait, counts=counts)

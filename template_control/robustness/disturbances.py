@@ -29,10 +29,7 @@ from template_control.slip.similarity import REFERENCE, Scale
 
 
 def engine(experiment: Experiment) -> PlantOptions:
-    """The physics engine of an experiment, whose friction, masses and ground can be disturbed.
-
-    A ParameterError if it has another plant.
-    """
+    """The physics engine of an experiment; a ParameterError if it has another plant."""
     if not isinstance(experiment.world, PlantOptions):
         raise ParameterError(
             f"the world is {plant_name(experiment.world)}, whose friction cannot be disturbed: give"
@@ -42,10 +39,7 @@ def engine(experiment: Experiment) -> PlantOptions:
 
 
 def with_step(world: PlantOptions, height: float, x: float) -> PlantOptions:
-    """The world with a step of its ground [m], none where the height is 0.
-
-    A ParameterError if it has a ground of its own.
-    """
+    """The world with a step of its ground [m], if it has no ground of its own."""
     if height == 0.0:
         return world
     if world.terrain is not None:
@@ -83,11 +77,7 @@ def footholds(where: PreparedExperiment, start: tuple[float, float, float], step
 
 @dataclass(frozen=True)
 class Unit:
-    """The unit that levels are shown in.
-
-    ``name`` stands after the number, "" for a coefficient. ``factor`` is one SI unit in this unit,
-    negative where a level is a share taken away.
-    """
+    """Name of the unit that levels are shown in, and one SI unit in it, negative for a lack."""
 
     name: str
     factor: float = 1.0
@@ -170,10 +160,7 @@ _NEWTON_SECONDS, _CENTIMETRES, _PER_CENT = Unit("N s"), Unit("cm", 100.0), Unit(
 
 
 def _push(name: str, title: str, sign: float = 1.0, direction: float = 0.0) -> Disturbance:
-    """A push, in a phase of the step by the trial's number.
-
-    ``direction`` is from forward to the left [rad], of a floating-base robot.
-    """
+    """A push to ``direction`` [rad], in a phase of the step by the trial's number."""
 
     def pushed(where: PreparedExperiment, level: float, trial: int) -> PreparedExperiment:
         seconds = PUSH_SECONDS * Scale.of(where.gait.parameters).time

@@ -51,10 +51,7 @@ class RobotBackend(ABC):
 
     @abstractmethod
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
-        """Start the controller where the run begins; (q, v) there.
-
-        A ParameterError if it is not clear where the feet are.
-        """
+        """Start the controller where the run begins; (q, v) there, or a ParameterError."""
 
     @abstractmethod
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
@@ -143,10 +140,7 @@ _REAR = 0  # the left foot stands where a run begins
 
 
 def _stand(z: Array, width: float, apart: float) -> Pose:
-    """At rest on both feet, ``width`` [m] apart to the side; ``z`` (3,) is at rest.
-
-    The front one is ``apart`` [m] ahead.
-    """
+    """At rest on both feet, ``width`` [m] apart, the front one ``apart`` [m] ahead; ``z`` (3,)."""
     feet = np.zeros((2, 3))
     feet[:, 0] = apart * np.array([-0.5, 0.5])
     feet[:, 1] = 0.5 * width * np.array(SIDES)
@@ -220,10 +214,7 @@ class FloatingBackend(RobotBackend):
         return q, v
 
     def _apex_pose(self, lateral: LateralPlanner, start: ApexStart) -> Pose:
-        """The pose at an apex: the planar one, in the gait's lateral motion.
-
-        The front leg's foot has stood last, and the rear leg's is about to land.
-        """
+        """The planar pose at an apex, its front foot the last that stood, in the gait's sway."""
         stood = SIDES[1 - _REAR]
         away, drift = lateral.cycle.states[stood.row]
         foothold = -0.5 * lateral.cycle.steps[stood.row]

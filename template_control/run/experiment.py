@@ -479,10 +479,7 @@ def _planner(spec: PlannerSpec, gait: Gait) -> Planner:
 
 
 def _check_strictly(motion: Gait | Route, planner: Planner | Planners) -> None:
-    """Refuse a walk that cannot be had as it is wanted.
-
-    A ScenarioError; a ParameterError if that is known only of walks of any speed.
-    """
+    """Refuse a walk that cannot be had as it is wanted."""
     ahead = next(iter(planner.values())) if isinstance(planner, Mapping) else planner
     if not isinstance(motion, ScenarioRoute) or not isinstance(ahead, AheadPlanner):
         raise ParameterError(

@@ -16,10 +16,7 @@ T = TypeVar("T")
 
 
 class Fact(Generic[T]):
-    """Attribute that reads an entry of ``metadata``: ``make`` of it.
-
-    ``name`` is the entry's; "": the attribute's own.
-    """
+    """Attribute that is ``make`` of the entry ``name`` of ``metadata``, by default its own name."""
 
     def __init__(self, make: Callable[[Any], T], name: str = "") -> None:
         self._make, self._name = make, name

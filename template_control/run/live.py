@@ -49,10 +49,7 @@ _TAKEN: set[int] = set()
 
 @contextmanager
 def exclusive(*parts: Any) -> Iterator[None]:
-    """Keep a run's parts (robot, route, planners) from other runs: each keeps one run's state.
-
-    A ParameterError if another run, maybe of another thread, uses one of them.
-    """
+    """Keep a run's parts, each of which has one run's state, from the runs of all threads."""
     keys = {id(part) for part in parts}
     with _LOCK:
         for part in parts:
@@ -299,10 +296,7 @@ class LiveRun:
 
 
 def _check_template(robot: Biped, given: SlipParameters) -> None:
-    """Check that a route's template is one of this robot; a ParameterError names both if not.
-
-    Mass, gravity and rest length are compared.
-    """
+    """Check that the mass, gravity and rest length of a route's template are the robot's."""
     own = template_for(robot)
     for name in ("mass", "gravity", "rest_length"):
         if abs(getattr(given, name) / getattr(own, name) - 1.0) > _OTHER_TEMPLATE:

@@ -81,10 +81,7 @@ class FallOptions(Checked):
 
 
 def check_pushes(pushes: tuple[Push, ...], steps: int) -> None:
-    """Check that a run of at most ``steps`` is long enough for its pushes.
-
-    A ParameterError names the push that would never come.
-    """
+    """Check that a run of at most ``steps`` is long enough for its pushes."""
     for push in pushes:
         if push.time is None and push.step >= steps:
             raise ParameterError(

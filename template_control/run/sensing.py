@@ -158,10 +158,7 @@ class ContactSensors:
 
 
 class TorqueDelay:
-    """Torques that take effect some ticks after the measurement they were computed from.
-
-    Until the first one is due, it is held.
-    """
+    """Torques that act some ticks after their measurement; until then the first one is held."""
 
     def __init__(self, ticks: int) -> None:
         self._line: deque[Array] = deque(maxlen=ticks + 1)

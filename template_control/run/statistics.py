@@ -120,10 +120,7 @@ class Counts(NamedTuple):
 
 
 def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
-    """Counts over the rows of a block, columns of the record by name.
-
-    ``torque_limit`` (nu,) is in N m.
-    """
+    """Counts over the rows of a block, columns of the record by name; limits (nu,) in N m."""
     torque, nu = block["torque"], len(torque_limit)
     angle, speed = block["q"][:, -nu:], block["v"][:, -nu:]
     size = np.abs(torque)
@@ -156,10 +153,7 @@ def _together(counted: list[Counts]) -> Counts:
 
 
 def statistics(counted: list[Counts], robot: Biped, torque_limit: Array) -> Statistics:
-    """Statistics of a run from the counts of its blocks, one at least.
-
-    ``torque_limit`` (nu,) are those that its controller had [N m].
-    """
+    """Statistics of a run from the counts of its blocks, one at least; limits (nu,) in N m."""
     found = _together(counted)
     ticks = max(int(found.ticks.sum()), 1)
     squares = found.error_square / np.maximum(found.ticks, 1)[:, None]

@@ -90,10 +90,7 @@ def _accepted(record: Record) -> dict[str, Any]:
 
 
 def _nearest(record: Record) -> dict[str, float]:
-    """Strides that were planned to end at another speed than the wanted one, and the largest error.
-
-    That is where the wanted speed is further away than a stride can lead.
-    """
+    """Strides whose wanted speed was further away than they can lead, and the largest error."""
     short = np.abs(record.section_target[:-1, 0] - record.section_predicted[:-1, 0])
     near = _NEAR * record.template.speed_unit
     return {"strides": int(np.sum(short > near)), "most": float(short.max(initial=0.0))}

@@ -265,11 +265,7 @@ def _hops(robot: Biped, gaits: Sequence[Gait]) -> bool:
 def check_direction(
     robot: Biped, gaits: Sequence[Gait], forward: float, left: float, turning: float
 ) -> None:
-    """Check that a robot with these gaits can go in the direction of a velocity.
-
-    Raises:
-        ParameterError: if not.
-    """
+    """Check that a robot with these gaits can go in the direction of a velocity."""
     if not isinstance(robot, FloatingBaseBiped) and (left or turning):
         raise ParameterError(
             f"{robot.name} is held in its plane: command it only forward or backward"

@@ -29,11 +29,7 @@ class ExecutorLostError(Exception):
 
 
 def check_pickles(function: Callable[..., Any], executor: Executor | None) -> None:
-    """Check, before the first call, that the function can be sent to worker processes.
-
-    A SweepError if it cannot be pickled; an executor other than a process pool is taken to send
-    what it can call. ``executor`` None stands for processes of this machine.
-    """
+    """Check, before the first call, that the function can be sent to worker processes."""
     # Dask sends what pickle cannot.
     if executor is not None and not isinstance(executor, ProcessPoolExecutor):
         return
@@ -154,11 +150,7 @@ class _Workers(ProcessPoolExecutor):
 
 
 def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
-    """Cancel the calls that have not started.
-
-    Where a worker dies meanwhile, its executor fails at a future that somebody else has cancelled:
-    so calls of our own, which are ended next, are left to it.
-    """
+    """Cancel the calls that have not started; our own workers fail if one dies meanwhile."""
     if not isinstance(pool, _Workers):
         for future in under_way:
             future.cancel()

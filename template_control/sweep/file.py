@@ -35,10 +35,7 @@ class Outcome(NamedTuple):
 
 
 def name_of(function: Callable[..., Any]) -> str:
-    """Module and qualified name; of a ``functools.partial`` its arguments too.
-
-    A TypeError if a partial's arguments are no plain data.
-    """
+    """Module and qualified name; of a ``functools.partial`` its arguments too."""
     if isinstance(function, partial):
         return (
             f"{name_of(function.func)}{json.dumps(to_jsonable([function.args, function.keywords]))}"
@@ -154,11 +151,7 @@ class SweepFile:
         self.finished[index] = Outcome(entry.get("result"), error)
 
     def append(self, index: int, seed: int, outcome: Outcome) -> None:
-        """Append a finished item; the line is flushed to the operating system before this returns.
-
-        ``index`` counts from 0; ``seed`` is that of :func:`~.sweep.item_seed`, ``outcome`` plain
-        data or an error.
-        """
+        """Append a finished item; the line is flushed to the operating system."""
         end = {"result": outcome.result} if outcome.error is None else {"error": outcome.error}
         entry = {"index": index, "item": self._items[index], "seed": seed, **end}
         self._write(json.dumps(entry).encode() + b"\n")

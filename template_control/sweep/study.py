@@ -95,16 +95,7 @@ def _experiment(table: Mapping[str, Any], item: Item) -> Experiment:
 
 
 def run_trial(experiment: dict[str, Any], item: Item, figures: list[str]) -> dict[str, Any]:
-    """Figures of a trial, by name.
-
-    Args:
-        experiment: table of what all trials have.
-        item: values of the keys that change.
-        figures: their names.
-
-    Raises:
-        SweepError: if a run has no such figure.
-    """
+    """Figures of a trial, by name."""
     summary = summarise(simulate(_experiment(experiment, item)), None)
     return {name: _entry(summary, name) for name in figures}
 

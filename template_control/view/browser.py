@@ -17,25 +17,14 @@ PORTS = Range(1, 65535)
 
 
 def show_in_browser(url: str) -> bool:
-    """Show a page in the user's browser; False where there is no display.
-
-    Args:
-        url: of the page.
-    """
+    """Show a page in the user's browser; False where there is no display."""
     if not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return False
     return webbrowser.open(url, new=2)
 
 
 def free_port(ports: Sequence[int]) -> int:
-    """The first port of this machine that is free.
-
-    Args:
-        ports: tried in turn.
-
-    Raises:
-        ParameterError: if none is free.
-    """
+    """The first of some ports of this machine that is free; a ParameterError if none is."""
     for port in ports:
         with socket.socket() as trial:
             trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -57,15 +57,7 @@ class Deeds:
 
 
 class Controls:
-    """Sliders, buttons and keys.
-
-    Args:
-        gui: viser's, of a server.
-        ranges: of the robot's velocity.
-        impulse: of a push at first [N s].
-        deeds: what they do.
-        friction: of the ground at first; None: it cannot be changed.
-    """
+    """Sliders, buttons and keys of viser's ``gui``; ``friction`` None cannot be changed."""
 
     def __init__(
         self,
@@ -262,12 +254,7 @@ class Figures:
         self._joints = [[i for foot in group for i in legs[foot]] for group in record.groups]
 
     def of(self, columns: Columns) -> tuple[float, float, float, float]:
-        """Figures of some ticks, whose ``columns`` are of :meth:`~.Recorder.latest`.
-
-        Returns:
-            Largest torque over its limit in each template leg, and mean vertical force of the
-            ground and of the template over the weight.
-        """
+        """Largest torque over its limit in each leg, and mean vertical forces over the weight."""
         share = np.abs(columns["torque"]).max(axis=0) / self._limit
         left, right = (float(share[joints].max()) for joints in self._joints)
         ground = columns["contact_force"][..., 1].sum(axis=1).mean() / self._weight

@@ -69,13 +69,7 @@ class Frame:
 
 
 def frame_of(record: Record, sides: Array, columns: Mapping[str, Any]) -> Frame:
-    """The last of some ticks.
-
-    Args:
-        record: of the run so far; its facts are read.
-        sides: (n,) how far to the left a planar robot's feet are [m].
-        columns: of :meth:`~.recorder.Recorder.latest`.
-    """
+    """The last of some ticks; planar feet are ``sides`` (n,) to the left [m]."""
     last = {name: values[-1:] for name, values in columns.items()}
     com, template, toes, foot, force = (found[0] for found in points(last, sides))
     rear, weight = int(last["rear"][0]), record.weight
@@ -251,12 +245,7 @@ class LiveScene:
         return marks
 
     def draw(self, frame: Frame, push: tuple[float, float] = (0.0, 0.0)) -> None:
-        """Show a moment; only what has changed is sent.
-
-        Args:
-            frame: the moment.
-            push: that is shown at the trunk, forward and to the left [N].
-        """
+        """Show a moment, with a push forward and to the left [N]; only changes are sent."""
         x, y, _ = frame.com.tolist()
         level = float(smoothed(self._terrain, np.array([x]), self._length)[0])
         self._world.position = (-x, -y, -level - self._middle)

@@ -23,11 +23,7 @@ _LOCAL = ("127.0.0.1", "localhost", "[::1]")
 
 
 def viser() -> Any:
-    """The package, an optional one.
-
-    Raises:
-        MissingPackageError: if it is not installed.
-    """
+    """The package, an optional one."""
     try:
         import viser as package
     except ImportError:
@@ -54,10 +50,7 @@ def is_own(host: str, origin: str | None) -> bool:
 
 @contextmanager
 def _closed_to_others() -> Iterator[None]:
-    """Let a server of viser's that starts meanwhile refuse what is not :func:`is_own`.
-
-    It has no option for it: it takes a request's ``Origin`` for granted.
-    """
+    """Let viser's server, which has no option for it, refuse what is not :func:`is_own`."""
     import websockets.asyncio.server as server
 
     serve = server.serve

@@ -101,10 +101,7 @@ def spring(radius: float) -> Array:
 
 
 def coil(shape: Array, begin: Array, end: Array) -> Array:
-    """(2, N) x and y of a leg's spring between two points (2,) of the picture [m].
-
-    ``shape`` is from :func:`spring`.
-    """
+    """(2, N) x and y of a leg's :func:`spring` between two points (2,) of the picture [m]."""
     span = end - begin
     normal = np.array([-span[1], span[0]]) / max(float(np.linalg.norm(span)), 1e-12)
     return np.asarray(begin[:, None] + np.stack((normal, span), axis=1) @ shape.T)

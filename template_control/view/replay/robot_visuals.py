@@ -127,11 +127,7 @@ def model_of(record: Record) -> pin.Model:
 
 
 def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:
-    """Places of the shapes in configurations ``q`` (F, nq) [m, rad].
-
-    Positions (F, shapes, 3), x forward, y to the left, z up [m], and quaternions (F, shapes, 4) x,
-    y, z, w.
-    """
+    """Positions (F, shapes, 3) [m] and quaternions x, y, z, w of the shapes in ``q`` (F, nq)."""
     data, shape_data = model.createData(), shapes.createData()
     positions = np.empty((len(q), len(shapes.geometryObjects), 3))
     quaternions = np.empty((*positions.shape[:2], 4))

@@ -73,10 +73,7 @@ def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, IntArray]:
 
 
 def smoothed(ground: Terrain, x: Array, length: float) -> Array:
-    """Height of the ground around places x (N,), as a mean over ``length`` [m] without its edges.
-
-    A camera goes up and down with it.
-    """
+    """Mean height of the ground over ``length`` [m] around places x (N,), for a camera."""
     around = np.linspace(-0.5, 0.5, _AROUND) * length
     return np.array([np.mean([ground.height_at(p) for p in place + around]) for place in x])
 
@@ -106,10 +103,7 @@ class Space:
 
 
 def in_space(record: Record, sides: Array) -> Space:
-    """A run in three directions.
-
-    ``sides`` (feet,) is how far to the left a planar robot's feet are [m].
-    """
+    """A run in three directions; planar feet are ``sides`` (feet,) to the left [m]."""
     com, template, toes, foot, force = points(vars(record), sides)
     samples = np.arange(len(record.time))
     of_legs = record.of_legs(toes)
@@ -148,10 +142,7 @@ def raised(places: Array) -> Array:
 
 
 def turned_to(direction: Array) -> Array:
-    """(F, 4) quaternions x, y, z, w that turn the vertical z into directions (F, 3).
-
-    Where a direction is zero nothing turns.
-    """
+    """(F, 4) quaternions x, y, z, w from the vertical to directions (F, 3); of zero none turns."""
     x, y, z = direction.T
     size = np.linalg.norm(direction, axis=1)
     zero = np.zeros(len(size))
@@ -169,10 +160,7 @@ _FOREVER = 1_000_000
 
 
 class _Gradual(mg.TriangularMeshGeometry):
-    """A mesh that appears little by little: a dashed material draws up to its dash's length.
-
-    ``frame`` says in which frame each vertex appears.
-    """
+    """A mesh whose vertices appear in their ``frame``: a dashed material draws up to its dash."""
 
     def __init__(self, vertices: Array, faces: IntArray, frame: Array) -> None:
         super().__init__(vertices, faces)
@@ -262,10 +250,7 @@ class _Scene:
 
 
 def scene_commands(playback: Playback) -> list[Any]:
-    """Commands that build and animate the scene; each has meshcat's ``lower()``.
-
-    A RecordError if the robot's visuals cannot be loaded.
-    """
+    """Commands that build and animate the scene; each has meshcat's ``lower()``."""
     scene, record = _Scene(playback.clock), playback.record
     length = float(record.template.rest_length)
     robot = load_visuals(record)

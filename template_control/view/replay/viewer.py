@@ -69,10 +69,7 @@ _LEGEND = (
 
 
 def page_of(title: str, commands: list[Any], legs: Sequence[tuple[str, str]]) -> str:
-    """Meshcat's viewer as one HTML page, with the commands of :func:`.scene.scene_commands`.
-
-    ``legs`` are names and colours, as of :func:`.style.legs_shown`.
-    """
+    """Meshcat's viewer as one HTML page, with commands, and legs by name and colour."""
     feet = [(color, f"{name}: ground force, footholds") for name, color in legs]
     signs = (f'<b style="color: {c}">&#9632;</b> {text}' for c, text in (*_LEGEND, *feet))
     packed = (base64.b64encode(umsgpack.packb(c.lower())).decode() for c in commands)
@@ -88,11 +85,7 @@ _PORTS = range(7000, 7100)
 
 
 class ReplayServer:
-    """A running server of a replay's HTML page; ends with :meth:`close` or the ``with`` block.
-
-    ``port`` None takes the first free one from 7000 up; ``url`` is where a browser finds the
-    replay. A ParameterError if the server does not start.
-    """
+    """A running server of a replay's page; ends with :meth:`close` or the ``with`` block."""
 
     def __init__(self, page: str, port: int | None = None) -> None:
         text = page.encode()
