@@ -26,6 +26,7 @@ from template_control.view.state_figures import (
     tracking_errors,
 )
 from template_control.view.style import (
+    AS_TEMPLATE,
     COM,
     DPI,
     LEFT,
@@ -44,6 +45,8 @@ from template_control.view.style import (
     legs_shown,
     mark_limits,
     mark_peaks,
+    over_time,
+    panelled,
     save_figure,
     shade,
     upward,
@@ -52,38 +55,30 @@ from template_control.view.style import (
 _LOOK = Look()
 _POSES = 0.06  # [s] from one pose of the stick diagram to the next
 _MOST_POSES = 40
+Rows = Sequence[tuple[Array, str, str]]
 
 
 def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
-    """The robot at regular times, with its CoM and the template's path (Fig. 12).
-
-    By default the look is of the 2.2 s that show what the run is about.
-    """
+    """The robot at regular times, with its CoM and the template's path (Fig. 12)."""
     w = look.rows(record, WINDOW)
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panelled(3.6)
     time = record.time[w.start : w.stop]
     apart = max(_POSES, (time[-1] - time[0]) / _MOST_POSES)
     rows = np.searchsorted(time, np.arange(time[0], time[-1], apart)) + w.start
     height = 2.0 * record.trunk_com
     for row in rows:
-        q = record.q[row]
         hip = record.joint[row, record.hinges[0][0]]
-        pitch = record.attitude[row, 1] if isinstance(record, FloatingRecord) else q[2]
-        top = hip + height * np.array([np.sin(pitch), np.cos(pitch)])
-        trunk = np.stack((hip, top))
+        pitch = record.attitude[row, 1] if isinstance(record, FloatingRecord) else record.q[row, 2]
+        trunk = np.stack((hip, hip + height * np.array([np.sin(pitch), np.cos(pitch)])))
         if len(record.legs) > len(SIDES):
             trunk = record.joint[row, [leg[0] for leg in record.hinges]]
         axes.plot(*trunk.T, color=TRUNK, linewidth=1.2, alpha=0.55, label="trunk")
         legs = zip(record.hinges, feet_shown(record), record.foot[row], strict=True)
         for leg, (name, color), foot in legs:
             points = np.vstack((record.joint[row, list(leg)], foot))
-            axes.plot(
-                *points.T, color=color, linewidth=1.0, alpha=0.65,
-                label=name.replace("foot", "leg"),
-            )  # fmt: skip
-    template = record.template_com[w]
-    axes.plot(*template.T, color=TEMPLATE, linewidth=1.0, linestyle="--", label="template's CoM")
+            label = name.replace("foot", "leg")
+            axes.plot(*points.T, color=color, linewidth=1.0, alpha=0.65, label=label)
+    axes.plot(*record.template_com[w].T, **AS_TEMPLATE, label="template's CoM")
     axes.plot(*record.com[rows].T, "o", color=COM, markersize=3.5, label="robot's CoM")
     low, high = axes.get_xlim()
     axes.plot(*np.transpose(record.ground.line(low, high)), color="0.3", linewidth=0.8)
@@ -95,36 +90,33 @@ def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
 
 def com_tracking(record: Record, look: Look = _LOOK) -> Figure:
     """The CoM ahead and upward against the template (Fig. 13a)."""
-    w = look.rows(record, WINDOW)
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-    panels = figure.subplots(2, 1, sharex=True)
-    for column, (axes, axis) in enumerate(zip(panels, ("x", upward(record)), strict=True)):
-        axes.plot(record.time[w], record.com[w, column], color=COM, label="robot")
-        axes.plot(
-            record.time[w], record.template_com[w, column], "--", color=TEMPLATE, linewidth=1.0,
-            label="template",
-        )  # fmt: skip
-        axes.set_ylabel(f"CoM {axis} [m]")
-        shade(axes, record, w)
-    panels[-1].set_xlabel("time [s]")
-    return finish(figure, panels, f"{as_text(record.robot_name)}: centre of mass", look)
+    rows = {
+        f"CoM {axis} [m]": (
+            (record.com[:, i], {"color": COM, "label": "robot"}),
+            (record.template_com[:, i], {**AS_TEMPLATE, "label": "template"}),
+        )
+        for i, axis in enumerate(("x", upward(record)))
+    }
+    drawn = over_time(record, look.rows(record, WINDOW), rows, 4.6)
+    return finish(*drawn, f"{as_text(record.robot_name)}: centre of mass", look)
 
 
 def _of_joints(record: Record, values: Array, limits: Array, what: str, look: Look) -> Figure:
     """Values (T, nu) of the joints, a panel a leg, with their ``limits``."""
     quantity, unit = what.split("|")
-    w = look.rows(record, WINDOW)
-    figure = Figure(figsize=(9.0, 2.5 * len(record.legs)), layout="constrained")
-    panels = figure.subplots(len(record.legs), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     names = [" / ".join(record.joints[i] for i in pair) for pair in zip(*record.legs, strict=True)]
-    for axes, leg, (foot, _) in zip(panels, record.legs, feet_shown(record), strict=True):
-        for joint, color, name in zip(leg, (LEFT, RIGHT, COM, TRUNK), names, strict=False):
-            axes.plot(record.time[w], values[w, joint], color=color, linewidth=0.9, label=name)
-        mark_limits(axes, [float(limits[joint]) for joint in leg], unit)
-        shade(axes, record, w)
+    colors = (LEFT, RIGHT, COM, TRUNK)
+    rows = {}
+    for leg, (foot, _) in zip(record.legs, feet_shown(record), strict=True):
         side = foot.removesuffix("foot").rstrip(" _")
-        axes.set_ylabel(f"{side} leg\n{quantity} [{unit}]")
-    panels[-1].set_xlabel("time [s]")
+        rows[f"{side} leg\n{quantity} [{unit}]"] = [
+            (values[:, joint], {"color": color, "linewidth": 0.9, "label": name})
+            for joint, color, name in zip(leg, colors, names, strict=False)
+        ]
+    w, height = look.rows(record, WINDOW), 2.5 * len(rows)
+    figure, panels = over_time(record, w, rows, height, sharey=True)
+    for axes, leg in zip(panels, record.legs, strict=True):
+        mark_limits(axes, limits[list(leg)].tolist(), unit)
     return finish(figure, panels, f"{as_text(record.robot_name)}: joint {quantity}s", look)
 
 
@@ -146,8 +138,7 @@ def ground_forces(record: Record, look: Look = _LOOK) -> Figure:
     template's forces.
     """
     w = look.rows(record, WINDOW)
-    figure = Figure(figsize=(9.0, 5.0), layout="constrained")
-    panels = figure.subplots(2, 1, sharex=True)
+    figure, panels = panelled(5.0, 2, sharex=True)
     time = record.time[w]
     for axes, axis, way in zip(panels, (1, 0), ("vertical", "horizontal"), strict=True):
         template = record.template_force[w, :, axis]
@@ -173,18 +164,16 @@ def apex_return(record: Record, look: Look = _LOOK) -> Figure:
     """
     apex = record.section == record.sections.index(Event.APEX.name)
     follows = apex[:-1] & apex[1:]
-    figure = Figure(figsize=(9.0, 4.6), layout="constrained")
-    panels = figure.subplots(1, 2)
-    shown = zip(panels, (0, 1), ("dx/dt", "y"), ("m/s", "m"), strict=True)
-    for axes, column, name, unit in shown:
-        z = record.section_state[:, column]
+    figure, panels = panelled(4.6, 1, 2)
+    columns = zip(record.section_state.T, record.section_target[:-1][follows][-1], strict=True)
+    names = ("dx/dt", "m/s"), ("y", "m")
+    for axes, (z, target), (name, unit) in zip(panels, columns, names, strict=False):
         before, after = z[:-1][follows], z[1:][follows]
-        number = np.flatnonzero(follows)
         axes.plot(before, after, color="0.8", linewidth=0.7, zorder=1)
+        number = np.flatnonzero(follows)
         points = axes.scatter(before, after, c=number, cmap="viridis", s=12, zorder=2)
-        low, high = min(before.min(), after.min()), max(before.max(), after.max())
-        axes.plot((low, high), (low, high), ":", color=TEMPLATE, linewidth=0.8, label="no change")
-        target = record.section_target[:-1, column][follows][-1]
+        ends = min(before.min(), after.min()), max(before.max(), after.max())
+        axes.plot(ends, ends, ":", color=TEMPLATE, linewidth=0.8, label="no change")
         axes.plot(target, target, "*", color=RIGHT, markersize=11, zorder=3, label="last target")
         axes.set(xlabel=f"{name} at an apex [{unit}]", ylabel=f"{name} at the next [{unit}]")
         axes.locator_params(axis="x", nbins=5)
@@ -192,41 +181,29 @@ def apex_return(record: Record, look: Look = _LOOK) -> Figure:
     return finish(figure, panels, f"{as_text(record.robot_name)}: from apex to apex", look)
 
 
-def _lines(
-    record: Record, w: slice, rows: Sequence[tuple[Array, str, str]], title: str, look: Look
-) -> Figure:
+def _lines(record: Record, seconds: float, rows: Rows, title: str, look: Look) -> Figure:
     """Panels over time, each with values (T,), their name with its unit, and their colour."""
-    figure = Figure(figsize=(9.0, 0.8 + 1.7 * len(rows)), layout="constrained")
-    panels = figure.subplots(len(rows), 1, sharex=True)
-    for axes, (values, name, color) in zip(panels, rows, strict=True):
-        axes.plot(record.time[w], values[w], color=color, linewidth=0.9)
+    curves = {name: [(of, {"color": color, "linewidth": 0.9})] for of, name, color in rows}
+    figure, panels = over_time(record, look.rows(record, seconds), curves, 0.8 + 1.7 * len(rows))
+    for axes in panels:
         axes.axhline(0.0, color=TEMPLATE, linewidth=0.5)
-        axes.set_ylabel(name)
-        shade(axes, record, w)
-    panels[-1].set_xlabel("time [s]")
     return finish(figure, panels, f"{as_text(record.robot_name)}: {title}", look)
 
 
 def turning(record: Record, look: Look = _LOOK) -> Figure:
-    """Pitch of the trunk, and angular momentum about the CoM.
-
-    In flight the angular momentum keeps its value: the trunk turns against the legs.
-    """
+    """Pitch of the trunk, and angular momentum about the CoM, which in flight keeps its value."""
     rows = (
         (np.degrees(record.q[:, 2]), "trunk pitch [deg]", TRUNK),
         (record.angular_momentum, "angular momentum\n[N m s]", COM),
     )
-    title = "trunk and angular momentum, forward positive"
-    return _lines(record, look.rows(record, WINDOW), rows, title, look)
+    return _lines(record, WINDOW, rows, "trunk and angular momentum, forward positive", look)
 
 
 def attitude(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     """Roll, pitch and yaw of the trunk in the heading frame."""
-    angles = np.degrees(record.attitude)
-    rows = [
-        (angles[:, i], f"{name} [deg]", TRUNK) for i, name in enumerate(("roll", "pitch", "yaw"))
-    ]
-    return _lines(record, look.rows(record, 2.0 * WINDOW), rows, "trunk in the heading frame", look)
+    angles = zip(np.degrees(record.attitude).T, ("roll", "pitch", "yaw"), strict=True)
+    rows = [(values, f"{name} [deg]", TRUNK) for values, name in angles]
+    return _lines(record, 2.0 * WINDOW, rows, "trunk in the heading frame", look)
 
 
 def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
@@ -249,9 +226,7 @@ def from_above(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     path, time = record.space_com[w], record.time[w]
     forward, side = np.ptp(path[:, :2], axis=0) + 0.6 * record.template.rest_length
     # As high as a figure 9 inches wide needs for equal scales, and for its axes and legend.
-    height = float(np.clip(8.2 * side / forward + 1.1, 2.0, 8.0))
-    figure = Figure(figsize=(9.0, height), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panelled(float(np.clip(8.2 * side / forward + 1.1, 2.0, 8.0)))
     axes.plot(path[:, 0], path[:, 1], color=COM, linewidth=0.8, label="CoM")
     for foot, (name, color) in enumerate(feet_shown(record)):
         places, times = footholds(record, foot)
@@ -265,8 +240,7 @@ def from_above(record: FloatingRecord, look: Look = _LOOK) -> Figure:
 def lateral_portrait(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     """Sway over its rate in single stance, from the foot that stands: left and right mirrored."""
     w = look.rows(record)
-    figure = Figure(figsize=(6.0, 5.0), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panelled(5.0, width=6.0)
     sway, single, rear = record.sway[w], record.in_phase(Phase.SS)[w], record.rear[w]
     for foot, (name, color) in enumerate(legs_shown(record)):
         shown = np.where((single & (rear == foot))[:, None], sway, np.nan)
@@ -280,16 +254,13 @@ def lateral_portrait(record: FloatingRecord, look: Look = _LOOK) -> Figure:
 def pressure(record: SoleRecord, look: Look = _LOOK) -> Figure:
     """The centre of pressure in each sole, seen from above; x forward is up in the figure."""
     w = look.rows(record)
-    figure = Figure(figsize=(6.0, 6.0), layout="constrained")
-    panels = figure.subplots(1, len(record.soles), sharex=True, sharey=True)
-    points = 1e3 * record.centre_of_pressure[w]
-    single = record.in_phase(Phase.SS)[w]
-    parts = ((single, "on one sole"), (~single, "on both"))
+    figure, panels = panelled(6.0, 1, len(record.soles), 6.0, sharex=True, sharey=True)
+    points, single = 1e3 * record.centre_of_pressure[w], record.in_phase(Phase.SS)[w]
     for foot, (name, color) in enumerate(feet_shown(record)):
         axes, (x, y, length, width) = panels[foot], 1e3 * record.soles[foot]
         corner = y - width, x - length
         axes.add_patch(Rectangle(corner, 2.0 * width, 2.0 * length, fill=False, color="0.3"))
-        for (part, phase), mark in zip(parts, (color, "0.6"), strict=True):
+        for part, phase, mark in ((single, "on one sole", color), (~single, "on both", "0.6")):
             seen = points[part, foot]
             axes.plot(seen[:, 1], seen[:, 0], ".", color=mark, markersize=2.0, label=phase)
         axes.plot(0.0, 0.0, "+", color="0.3", label="toe")
@@ -329,12 +300,7 @@ _PLANAR_ONLY = ("energies", "turning", "apex_return")
 
 
 def figures_of(record: Record, template: ScenarioRecord | None = None) -> dict[str, Draw]:
-    """The figures that have something to show of a run: apexes need two that follow each other.
-
-    Args:
-        record: the run.
-        template: of a run through a scenario, the same one on the robot's template.
-    """
+    """The figures that have something to show of a run, and of its scenario on the template."""
     of_route = {} if template is None else route_figures(record, template)
     if isinstance(record, FloatingRecord):
         shared = {name: draw for name, draw in FIGURES.items() if name not in _PLANAR_ONLY}
@@ -348,10 +314,7 @@ def figures_of(record: Record, template: ScenarioRecord | None = None) -> dict[s
 def _chosen(
     record: Record, names: Sequence[str] | None, template: ScenarioRecord | None = None
 ) -> dict[str, Draw]:
-    """Figures of a run by name; ``template`` as of :func:`figures_of`.
-
-    A ParameterError if there is no figure of a name, a RecordError if the run cannot be shown.
-    """
+    """Some figures of a run by name, by default all of :func:`figures_of`."""
     record.check_shown()
     known = figures_of(record, template)
     for name in names or ():

@@ -18,6 +18,7 @@ from template_control.slip.scenario.run import ScenarioRecord
 from template_control.view.replay.playback import stances
 from template_control.view.state_figures import leg_stiffness, template_energies
 from template_control.view.style import (
+    AS_TEMPLATE,
     COM,
     LEFT,
     RIGHT,
@@ -30,6 +31,7 @@ from template_control.view.style import (
     finish,
     mark_limits,
     mark_transitions,
+    panelled,
     save_figure,
     shade,
 )
@@ -41,14 +43,6 @@ ROUTE_FIGURES = ("scenario", "transitions")
 _AROUND = 1.2  # [s] shown on either side of a transition
 
 
-def _path(axes: Axes, record: ScenarioRecord) -> None:
-    x = record.state[:, 0]
-    shade(axes, record, _WHOLE, x)
-    axes.plot(x, record.state[:, 1], color=COM, linewidth=1.2, label="CoM")
-    _mark_footholds(axes, record.foothold[:, 1])
-    axes.set(xlabel="x [m]", ylabel="y [m]")
-
-
 def _mark_footholds(axes: Axes, x: Array) -> None:
     """Footholds along the lower edge of a panel over x [m]."""
     axes.plot(
@@ -57,40 +51,37 @@ def _mark_footholds(axes: Axes, x: Array) -> None:
     )  # fmt: skip
 
 
-def _controls(stiffness: Axes, angle: Axes, record: ScenarioRecord) -> None:
+def scenario_figure(record: ScenarioRecord) -> Figure:
+    """CoM path with footholds, stiffness, touchdown angle and speed (Fig. 10a, b)."""
+    shares = {"height_ratios": [1.0, 1.2, 0.9, 1.1]}
+    figure, panels = panelled(7.2, 4, gridspec_kw=shares)
+    path, stiffness, angle, speed = panels
+    x, time = record.state[:, 0], record.time
+    path.plot(x, record.state[:, 1], color=COM, linewidth=1.2, label="CoM")
+    _mark_footholds(path, record.foothold[:, 1])
+    path.set(xlabel="x [m]", ylabel="y [m]")
     loaded = np.where(record.stiffness > 0.0, record.stiffness / 1e3, np.nan)
-    for leg, (name, color) in enumerate((("rear", LEFT), ("front", RIGHT))):
-        stiffness.plot(record.time, loaded[:, leg], color=color, linewidth=1.0, label=f"{name} leg")
-    stiffness.set_ylabel("leg stiffness\n[kN/m]")
+    _plot_legs(stiffness, time, loaded, "leg stiffness\n[kN/m]")
     degrees = np.degrees(record.controls[:, Slot.TOUCHDOWN_ANGLE])
     angle.step(record.section_time[:-1], degrees, where="post", color=LEFT, linewidth=1.0)
     angle.set_ylabel("touchdown\nangle [deg]")
-    for axes in (stiffness, angle):
-        shade(axes, record, _WHOLE)
-
-
-def _speed(axes: Axes, record: ScenarioRecord) -> None:
-    shade(axes, record, _WHOLE)
-    axes.plot(record.time, record.state[:, 2], color=COM, linewidth=1.0, label="CoM")
-    axes.plot(
+    speed.plot(time, record.state[:, 2], color=COM, linewidth=1.0, label="CoM")
+    speed.plot(
         record.section_time[1:], record.wanted_speed, "--", color=TRUNK, linewidth=1.0,
         label="wanted at the next section",
     )  # fmt: skip
-    axes.set(xlabel="time [s]", ylabel="dx/dt [m/s]")
-
-
-def scenario_figure(record: ScenarioRecord) -> Figure:
-    """CoM path with footholds, stiffness, touchdown angle and speed (Fig. 10a, b)."""
-    figure = Figure(figsize=(9.0, 7.2), layout="constrained")
-    path, stiffness, angle, speed = figure.subplots(
-        4, 1, gridspec_kw={"height_ratios": [1.0, 1.2, 0.9, 1.1]}
-    )
-    _path(path, record)
-    _controls(stiffness, angle, record)
-    _speed(speed, record)
+    speed.set(xlabel="time [s]", ylabel="dx/dt [m/s]")
+    for axes in panels:
+        shade(axes, record, _WHOLE, x if axes is path else None)
     name, map_name = as_text(record.metadata["name"]), record.metadata["map"]
-    title = f"{name}, controllers on the {map_name} map"
-    return finish(figure, (path, stiffness, angle, speed), title, _LOOK)
+    return finish(figure, panels, f"{name}, controllers on the {map_name} map", _LOOK)
+
+
+def _plot_legs(axes: Axes, time: Array, values: Array, name: str) -> None:
+    """Values (T, 2) of the template's rear and front leg."""
+    for leg, (side, color) in enumerate((("rear", LEFT), ("front", RIGHT))):
+        axes.plot(time, values[:, leg], color=color, linewidth=1.0, label=f"{side} leg")
+    axes.set_ylabel(name)
 
 
 def energy_figure(record: ScenarioRecord) -> Figure:
@@ -107,13 +98,9 @@ def energy_figure(record: ScenarioRecord) -> Figure:
 def _around_transitions(
     record: Record | ScenarioRecord, energies: dict[str, Array], title: str, look: Look
 ) -> Figure:
-    """Energies (T,) around each transition, by name, less their first values.
-
-    Offsets do not matter here; what matters is whether the curves move together.
-    """
+    """Energies (T,) around each transition, by name, less their first values."""
     spans = _transitions(record)
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    panels = figure.subplots(1, max(len(spans), 1), squeeze=False)[0]
+    figure, panels = panelled(3.8, 1, max(len(spans), 1))
     for axes, span in zip(panels, spans, strict=False):
         begin, end, name = span
         w = (record.time > begin - _AROUND) & (record.time < end + _AROUND)
@@ -147,32 +134,21 @@ def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Pa
     return [save_figure(figure, Path(folder) / f"{name}.png") for name, figure in figures.items()]
 
 
-def _template_begins(record: Record) -> tuple[float, float]:
-    """Time [s] and place [m] of the robot's first stride that the template makes, too."""
-    kinds = record.kinds_of_stride
-    first = next((i for i, kind in enumerate(kinds) if kind not in STANDING), 0)
-    if first == 0:
-        return 0.0, 0.0
-    begin = float(record.section_time[first])
-    return begin, float(np.interp(begin, record.time, record.com[:, 0]))
-
-
 def route_figure(template: ScenarioRecord, record: Record, look: Look = _LOOK) -> Figure:
-    """Speed, path of the CoM with footholds, leg stiffnesses and torques.
+    """Speed, path of the CoM with footholds, leg stiffnesses and torques, with the template's.
 
-    ``template`` is the same scenario on the robot's template; where the robot stands first, it
-    begins when the robot has walked off.
+    Where the robot stands first, its template begins when it has walked off.
     """
-    figure = Figure(figsize=(9.0, 9.6), layout="constrained")
-    panels = speed, path, stiffness, torque = figure.subplots(4, 1)
-    begin, where = _template_begins(record)
+    figure, panels = panelled(9.6, 4)
+    speed, path, stiffness, torque = panels
+    kinds, begin, where = record.kinds_of_stride, 0.0, 0.0
+    if first := next((i for i, kind in enumerate(kinds) if kind not in STANDING), 0):
+        begin = float(record.section_time[first])
+        where = float(np.interp(begin, record.time, record.com[:, 0]))
     w = look.rows(record)
-    shown = begin + template.time <= record.time[w][-1]
+    alone = {**AS_TEMPLATE, "linewidth": 0.8, "label": "the template alone"}
     speed.plot(record.time, record.com_velocity[:, 0], color=COM, linewidth=1.0, label="robot")
-    speed.plot(
-        begin + template.time, template.state[:, 2], "--", color=TEMPLATE, linewidth=0.8,
-        label="the template alone",
-    )  # fmt: skip
+    speed.plot(begin + template.time, template.state[:, 2], **alone)
     speed.step(
         record.section_time[1:], record.section_target[:-1, 0], where="pre", color=RIGHT,
         linewidth=1.0, label="wanted at the next section",
@@ -184,19 +160,15 @@ def route_figure(template: ScenarioRecord, record: Record, look: Look = _LOOK) -
         )  # fmt: skip
     speed.set_ylabel("dx/dt [m/s]")
     path.plot(*record.com[w].T, color=COM, linewidth=1.0, label="robot")
-    path.plot(
-        where + template.state[shown, 0], template.state[shown, 1], "--", color=TEMPLATE,
-        linewidth=0.8, label="the template alone",
-    )  # fmt: skip
-    first, *_, last = record.com[w, 0].tolist()
+    shown = begin + template.time <= record.time[w][-1]
+    path.plot(where + template.state[shown, 0], template.state[shown, 1], **alone)
+    left, *_, right = record.com[w, 0].tolist()
     spans = enumerate(stances(record))
     holds = np.array([record.foot[first, foot, 0] for foot, of in spans for first, _ in of])
-    _mark_footholds(path, holds[(holds >= first) & (holds <= last)])
-    path.set(xlabel="x [m]", ylabel="CoM y [m]", xlim=(first, last))
-    for leg, (name, color) in enumerate((("rear", LEFT), ("front", RIGHT))):
-        values = 1e-3 * leg_stiffness(record)[:, leg]
-        stiffness.plot(record.time, values, color=color, linewidth=1.0, label=f"{name} leg")
-    stiffness.set_ylabel("template's leg\nstiffness [kN/m]")
+    _mark_footholds(path, holds[(holds >= left) & (holds <= right)])
+    path.set(xlabel="x [m]", ylabel="CoM y [m]", xlim=(left, right))
+    name = "template's leg\nstiffness [kN/m]"
+    _plot_legs(stiffness, record.time, 1e-3 * leg_stiffness(record), name)
     for joint, name in enumerate(record.joints):
         color = (LEFT, RIGHT, COM, TRUNK)[joint % 4]
         torque.plot(record.time, record.torque[:, joint], color=color, linewidth=0.6, label=name)
@@ -221,10 +193,7 @@ def _transitions(record: Record | ScenarioRecord) -> list[tuple[float, float, st
 
 
 def transition_energies(record: Record, look: Look = _LOOK) -> Figure:
-    """Energies of the robot's CoM and of the template around each transition (Fig. 10c, d).
-
-    The run has one transition at least.
-    """
+    """Energies of the robot's CoM and of the template around each transition (Fig. 10c, d)."""
     p = record.template
     named = {
         "forward kinetic": 0.5 * p.mass * record.com_velocity[:, 0] ** 2,
@@ -235,9 +204,6 @@ def transition_energies(record: Record, look: Look = _LOOK) -> Figure:
 
 
 def route_figures(record: Record, template: ScenarioRecord) -> dict[str, Draw]:
-    """Figures of a way through a scenario, by name; without transitions there are no energies.
-
-    ``template`` is the same scenario on the robot's template.
-    """
+    """Figures of a robot and its template in a scenario; without transitions no energies."""
     figures: dict[str, Draw] = {"scenario": partial(route_figure, template)}
     return figures | ({"transitions": transition_energies} if _transitions(record) else {})

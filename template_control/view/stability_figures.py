@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.slip.gaits.branch import BranchPoint, Kind, Special
+from template_control.view.style import gallery, panelled
 
 _KINDS = {
     Kind.STABLE: "#2a6196",
@@ -23,6 +24,7 @@ _MARKS = {
     Special.FLIP: "v",
     Special.NEIMARK_SACKER: "o",
 }
+_SPEED = "mean speed [m/s]"
 _MAPS = ("#db7321", "#2a6196", "#3a9a4a")
 UNITS = {
     "energy": ("energy [J]", 1.0),
@@ -52,8 +54,8 @@ def branch_figure(
     curves = [(UNITS[s][0], UNITS[s][1] * np.array([p.quantity(s) for p in points])) for s in show]
     largest = np.array([np.abs(p.eigenvalues).max() for p in points])
     curves.append(("largest |eigenvalue|", largest))
-    figure = Figure(figsize=(9.0, 3.4), layout="constrained")
-    for axes, (name, y) in zip(np.atleast_1d(figure.subplots(1, len(curves))), curves, strict=True):
+    figure, panels = panelled(3.4, 1, len(curves))
+    for axes, (name, y) in zip(panels, curves, strict=True):
         axes.plot(x, y, color="0.8", linewidth=0.8, zorder=1)
         for kind, color in _KINDS.items():
             of = np.array([p.kind is kind and p.special is None for p in points])
@@ -99,9 +101,7 @@ def basin_figure(
         converges: (e, a, h) whether the walk converges to the equilibrium.
     """
     columns = min(4, len(energies))
-    rows = -(-len(energies) // columns)
-    figure = Figure(figsize=(9.0, 2.3 * rows + 0.3), layout="constrained")
-    panels = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False).ravel()
+    figure, panels = gallery(len(energies), columns, (2.3, 0.3), sharex=True, sharey=True)
     extent = (heights[0], heights[-1], angles[0], angles[-1])
     image = None
     for axes, energy, fall, good in zip(panels, energies, steps, converges, strict=False):
@@ -113,12 +113,10 @@ def basin_figure(
             heights, angles, good.astype(float), levels=[0.5, 1.5], colors=["#2a6196"], alpha=0.85
         )
         axes.set_title(f"{energy:.2f} J", fontsize=9)
-    for axes in panels[len(energies) :]:
-        axes.set_visible(False)
     figure.supxlabel("y at VLO [m]", fontsize=10)
     figure.supylabel("velocity angle, downward [deg]", fontsize=10)
     if image is not None:
-        figure.colorbar(image, ax=panels.tolist(), label="steps to fall (blue: converges)")
+        figure.colorbar(image, ax=figure.axes, label="steps to fall (blue: converges)")
     return figure
 
 
@@ -140,8 +138,7 @@ def deadbeat_figure(
         shares: by map, (m,) Pz_in.
         published: the paper's alpha_min [deg].
     """
-    figure = Figure(figsize=(9.0, 3.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
+    figure, (left, right) = panelled(3.8, 1, 2)
     name, inside = next(iter(settled.items()))
     left.plot(heights[inside], angles[inside], ".", color=_MAPS[1], markersize=1.5, label="settles")
     left.plot(
@@ -162,21 +159,18 @@ def speed_family_figure(
 ) -> Figure:
     """Gaits against their mean speed, one line for each chain of a family.
 
-    ``quantities`` are by the axis' label, values of each chain; "mean speed [m/s]" is the
-    horizontal axis of all panels. ``pairs`` are by the axis' label and the curve's, values that
-    share a panel.
+    ``quantities`` are by the axis' label, values of each chain, and ``pairs`` by the axis' and the
+    curve's label, which share a panel.
     """
-    x = quantities["mean speed [m/s]"]
-    panels = {k: {"": v} for k, v in quantities.items() if k != "mean speed [m/s]"} | dict(pairs)
+    x = quantities[_SPEED]
+    panels = {k: {"": v} for k, v in quantities.items() if k != _SPEED} | dict(pairs)
     columns = -(-len(panels) // 2)
-    figure = Figure(figsize=(2.6 * columns, 4.6), layout="constrained")
-    for axes, (label, curves) in zip(
-        figure.subplots(2, columns).flat, panels.items(), strict=False
-    ):
+    figure, found = panelled(4.6, 2, columns, 2.6 * columns)
+    for axes, (label, curves) in zip(found, panels.items(), strict=False):
         for colour, (name, chains) in zip(_MAPS, curves.items(), strict=False):
             for i, (speeds, values) in enumerate(zip(x, chains, strict=True)):
                 axes.plot(speeds, values, color=colour, label=name if name and i == 0 else None)
-        axes.set(xlabel="mean speed [m/s]", ylabel=label)
+        axes.set(xlabel=_SPEED, ylabel=label)
         if len(curves) > 1:
             axes.legend(fontsize="small")
     return figure

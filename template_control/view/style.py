@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -48,12 +49,47 @@ def figure_style() -> AbstractContextManager[None]:
     return mpl.rc_context({**look, "axes.spines.top": False, "axes.spines.right": False})
 
 
-def feet_shown(record: Record) -> list[tuple[str, str]]:
-    """Name and colour of each foot: of a biped left and right, of others by link and template leg.
+def panelled(
+    height: float, rows: int = 1, columns: int = 1, width: float = 9.0, **shared: Any
+) -> tuple[Figure, Any]:
+    """A figure of a size [inch], and its panels row by row."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    return figure, figure.subplots(rows, columns, squeeze=False, **shared).ravel()
 
-    Args:
-        record: the run.
-    """
+
+def gallery(
+    count: int, columns: int, row: tuple[float, float], width: float = 9.0, **shared: Any
+) -> tuple[Figure, Any]:
+    """As :func:`panelled`, for so many panels; a row's height, and what is around the rows."""
+    rows = -(-count // columns)
+    figure, panels = panelled(row[0] * rows + row[1], rows, columns, width, **shared)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    return figure, panels[:count]
+
+
+Curve = tuple[Array, dict[str, Any]]
+"""Values (T,), and how their line looks."""
+AS_TEMPLATE: dict[str, Any] = {"color": TEMPLATE, "linestyle": "--", "linewidth": 1.0}
+"""Look of the template's curve next to the robot's."""
+
+
+def over_time(
+    record: Record, w: slice, rows: Mapping[str, Sequence[Curve]], height: float, **shared: Any
+) -> tuple[Figure, Any]:
+    """A panel over time for each row, by its name with the unit; single stance is shaded."""
+    figure, panels = panelled(height, len(rows), sharex=True, **shared)
+    for axes, (name, curves) in zip(panels, rows.items(), strict=True):
+        for values, look in curves:
+            axes.plot(record.time[w], values[w], **look)
+        axes.set_ylabel(name)
+        shade(axes, record, w)
+    panels[-1].set_xlabel("time [s]")
+    return figure, panels
+
+
+def feet_shown(record: Record) -> list[tuple[str, str]]:
+    """Name and colour of each foot: of a biped left and right, of others by link and leg."""
     if len(record.feet) == len(SIDES):
         return list(zip(_FEET, SIDES, strict=True))
     colors = {foot: SIDES[leg] for leg, group in enumerate(record.groups) for foot in group}
@@ -61,21 +97,14 @@ def feet_shown(record: Record) -> list[tuple[str, str]]:
 
 
 def legs_shown(record: Record) -> list[tuple[str, str]]:
-    """Name and colour of the foot of each template leg.
-
-    Args:
-        record: the run.
-    """
+    """Name and colour of the foot of each template leg."""
     names = [name for name, _ in feet_shown(record)]
     pairs = [" and ".join(names[foot] for foot in group) for group in record.groups]
     return list(zip(pairs, SIDES, strict=True))
 
 
 def moment(value: float | None, default: float, last: float) -> float:
-    """Time that a user gives [s], negative from the run's end; None: ``default``.
-
-    A ParameterError if it is not finite.
-    """
+    """Time that a user gives [s], negative from the run's end; None: ``default``."""
     if value is None:
         return default
     if not math.isfinite(value):
@@ -86,10 +115,7 @@ def moment(value: float | None, default: float, last: float) -> float:
 def interval(
     record: Record, start: float | None, end: float | None, default: tuple[float, float]
 ) -> tuple[float, float]:
-    """Part of a run that a user asks for [s], negative from its end; None: the default's.
-
-    A ParameterError if nothing lies between its ends.
-    """
+    """Part of a run between two :func:`moment` s, which is not empty [s]."""
     first, last = float(record.time[0]), float(record.time[-1])
     begin, stop = moment(start, default[0], last), moment(end, default[1], last)
     if not (first <= begin < stop):
@@ -136,27 +162,20 @@ Draw = Callable[[Any, Look], Figure]
 
 
 def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
-    """Part of a run, ``seconds`` long, that shows what it is about [s].
-
-    That is a fall, the first push, the first change of the stride's kind, or the first uneven
-    ground; else the end.
-    """
+    """Part of a run that shows its fall, else its first push, other stride or uneven ground [s]."""
     time, last = record.time, float(record.time[-1])
     pushed = np.flatnonzero(record.push)
-    kinds = record.kinds_of_stride
-    changes = [i for i in range(1, len(kinds)) if kinds[i] != kinds[i - 1]]
-    heights = [record.ground.height_at(float(x)) for x in record.com[::50, 0]]
-    uneven = np.flatnonzero(np.diff(heights))
+    changes = [i for i, (a, b) in enumerate(pairwise(record.kinds_of_stride), 1) if a != b]
+    uneven = np.flatnonzero(np.diff([record.ground.height_at(x) for x in record.com[::50, 0]]))
+    middle = last
     if record.fell:
-        middle = last
+        pass
     elif len(pushed):
         middle = float(time[pushed[0]]) + 0.3 * seconds
     elif changes:
         middle = float(record.section_time[changes[0]])
     elif len(uneven):
         middle = float(time[::50][uneven[0]])
-    else:
-        middle = last
     begin = min(max(middle - 0.5 * seconds, float(time[0])), max(last - seconds, float(time[0])))
     return begin, min(begin + seconds, last)
 
@@ -179,10 +198,7 @@ def as_text(name: str) -> str:
 def shade(
     axes: Axes, record: Record | ScenarioRecord, w: slice, horizontal: Array | None = None
 ) -> None:
-    """Shade single stance in grey, as in Fig. 13, for the samples ``w`` that the panel shows.
-
-    ``horizontal`` (T,) is what it has on its abscissa; None: time [s].
-    """
+    """Shade single stance in the samples ``w`` of a panel over ``horizontal`` (T,), or time [s]."""
     single = np.array([name == Phase.SS.name for name in record.metadata["phases"]])[record.node]
     axes.fill_between(
         (record.time if horizontal is None else horizontal)[w], 0.0, 1.0,
@@ -212,20 +228,17 @@ def mark_limits(axes: Axes, limits: Sequence[float], unit: str) -> None:
 
 
 def mark_peaks(axes: Axes, time: Array, values: Array, color: str) -> None:
-    """Mark what sticks out of a panel over time [s], such as impacts, with its size.
-
-    The panel's limits are set; ``time`` (n,) is in s, ``values`` (n,) in N.
-    """
+    """Mark what sticks out of a panel over time [s], such as impacts, with its size [N]."""
     low, high = axes.get_ylim()
     out = (values > high) | (values < low)
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], out.astype(np.int8), [0]))))
+    edges = np.flatnonzero(np.diff(out.astype(np.int8), prepend=0, append=0))
     shown = -np.inf
     for first, after in edges.reshape(-1, 2):
         peak = first + int(np.argmax(np.abs(values[first:after])))
-        up = values[peak] > high
         if time[peak] - shown < 0.02 * (time[-1] - time[0]):
             continue  # the same impact rattles
         shown = time[peak]
+        up = values[peak] > high
         place = high if up else low
         axes.plot(
             time[peak], place, "^" if up else "v", color=color, markersize=4, clip_on=False,
@@ -238,10 +251,7 @@ def mark_peaks(axes: Axes, time: Array, values: Array, color: str) -> None:
 
 
 def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Figure:
-    """Give a figure one legend, outside of its panels, and its title if the look has one.
-
-    The panels' lines are explained, each name once.
-    """
+    """Give a figure one legend, below its panels, and its title if the look has one."""
     found: dict[str, Any] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
@@ -251,10 +261,9 @@ def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Fi
             del found[name]
             found[name] = Patch(facecolor=color, alpha=alpha, edgecolor="0.7", linewidth=0.4)
     if found:
-        columns = min(len(found), 6)
         figure.legend(
-            list(found.values()), list(found), loc="outside lower center", ncols=columns,
-            frameon=False, fontsize=8,
+            list(found.values()), list(found), loc="outside lower center",
+            ncols=min(len(found), 6), frameon=False, fontsize=8,
         )  # fmt: skip
     if look.titled:
         figure.suptitle(title, fontsize=10)
@@ -262,10 +271,7 @@ def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Fi
 
 
 def save_figure(figure: Figure, path: str | Path, dpi: int = DPI) -> Path:
-    """Write a figure; a file that is there is replaced by a whole one or stays.
-
-    The path's ending chooses the format; ``dpi`` are dots per inch, of a picture made of dots.
-    """
+    """Write a figure in the format of the path's ending; ``dpi`` are dots per inch."""
     with atomic_path(path) as place:
         figure.savefig(place, dpi=dpi)
     return Path(path)

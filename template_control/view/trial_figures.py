@@ -17,7 +17,7 @@ from template_control.robustness.disturbances import AFTER
 from template_control.robustness.findings import Finding, Robustness, wilson_interval
 from template_control.sweep.study import Study, heat_map
 from template_control.sweep.sweep import SweepResult
-from template_control.view.style import LEFT, RIGHT, as_text
+from template_control.view.style import LEFT, RIGHT, as_text, gallery, panelled
 
 _SHOWN = {
     "friction": ("friction", 1.0),
@@ -47,14 +47,10 @@ def campaign_figure(campaign: Campaign) -> Figure:
         low, high = getattr(mix, name)
         if low < high:
             panels[title] = factor * np.array([getattr(t.draw, name) for t in campaign.trials])
-    rows = -(-len(panels) // _COLUMNS)
-    figure = Figure(figsize=(9.0, 2.2 * rows + 0.6), layout="constrained")
-    axes = figure.subplots(rows, _COLUMNS, sharey=True, squeeze=False).ravel()
-    for panel, (title, values) in zip(axes, panels.items(), strict=False):
+    figure, axes = gallery(len(panels), _COLUMNS, (2.2, 0.6), sharey=True)
+    for panel, (title, values) in zip(axes, panels.items(), strict=True):
         _share_panel(panel, values, campaign.trials)
         panel.set_xlabel(title, fontsize=9)
-    for panel in axes[len(panels) :]:
-        panel.set_visible(False)
     figure.legend(
         *axes[0].get_legend_handles_labels(), fontsize=8, loc="outside lower center", ncols=2
     )
@@ -66,17 +62,16 @@ def campaign_figure(campaign: Campaign) -> Figure:
 
 
 def _share_panel(axes: Axes, values: Array, trials: Sequence[Trial]) -> None:
+    width = 0.01 * (float(np.ptp(values)) or 1.0)
     for shift, (label, color, good) in enumerate(
         (
-            ("no fall", RIGHT, [not t.fell for t in trials]),
-            ("on its gait", LEFT, [t.good for t in trials]),
+            ("no fall", RIGHT, np.array([not t.fell for t in trials])),
+            ("on its gait", LEFT, np.array([t.good for t in trials])),
         )
     ):
-        width = 0.01 * (float(np.ptp(values)) or 1.0)
         for part in np.array_split(np.argsort(values, kind="stable"), _BINS):
             if len(part):
-                count = int(np.sum(np.array(good)[part]))
-                share = count / len(part)
+                count, share = int(good[part].sum()), float(good[part].mean())
                 low, high = wilson_interval(count, len(part))
                 sure = 100.0 * np.array([[share - low], [high - share]])
                 axes.errorbar(
@@ -100,13 +95,10 @@ def robustness_figure(found: Robustness) -> Figure:
     confidence. Dotted: what the template alone takes at its section.
     """
     columns = min(_LEVEL_COLUMNS, len(found.findings))
-    rows = -(-len(found.findings) // columns)
-    figure = Figure(figsize=(2.1 * columns + 0.4, 2.0 * rows + 0.7), layout="constrained")
-    panels = figure.subplots(rows, columns, sharey=True, squeeze=False).ravel()
-    for axes, finding in zip(panels, found.findings, strict=False):
+    size = (2.0, 0.7), 2.1 * columns + 0.4
+    figure, panels = gallery(len(found.findings), columns, *size, sharey=True)
+    for axes, finding in zip(panels, found.findings, strict=True):
         _level_panel(axes, finding)
-    for axes in panels[len(found.findings) :]:
-        axes.set_visible(False)
     figure.supylabel("success rate [%]", fontsize=9)
     figure.suptitle(
         f"{as_text(found.robot)} in {found.plant}: success over {AFTER} steps", fontsize=10
@@ -125,22 +117,21 @@ def robustness_figure(found: Robustness) -> Figure:
 
 
 def _level_panel(axes: Axes, finding: Finding) -> None:
-    d = finding.disturbance
-    levels = d.unit.factor * np.array([level.level for level in finding.levels])
-    rates = 100.0 * np.array([level.rate for level in finding.levels])
+    d, tried = finding.disturbance, finding.levels
+    levels = d.unit.factor * np.array([level.level for level in tried])
     if d.passing:
-        standing = 100.0 * np.array([level.standing for level in finding.levels])
+        standing = [100.0 * level.standing for level in tried]
         axes.plot(levels, standing, ".-", color=_STANDING, linewidth=1.2)
-    sure = 100.0 * np.array([level.interval for level in finding.levels])
+    sure = 100.0 * np.array([level.interval for level in tried])
     axes.fill_between(levels, *sure.T, color=_RATE, alpha=0.15, linewidth=0.0)
+    rates = [100.0 * level.rate for level in tried]
     axes.plot(levels, rates, "o-", color=_RATE, markersize=3.5, linewidth=1.2)
-    if finding.template:
-        limit = d.unit.factor * finding.template
-        axes.axvline(limit, color=_TEMPLATE, linestyle=":", linewidth=1.2)
-    if finding.breaking_point is not None:
-        axes.axvline(
-            d.unit.factor * finding.breaking_point, color=_POINT, linestyle="--", linewidth=1.0
-        )
+    for level, color, style, width in (
+        (finding.template or None, _TEMPLATE, ":", 1.2),
+        (finding.breaking_point, _POINT, "--", 1.0),
+    ):
+        if level is not None:
+            axes.axvline(d.unit.factor * level, color=color, linestyle=style, linewidth=width)
     axes.axhline(50.0, color="0.85", linewidth=0.8, zorder=0)
     if len(levels) > 1 and levels[-1] < levels[0]:
         axes.invert_xaxis()
@@ -163,25 +154,19 @@ def study_figure(study: Study, result: SweepResult) -> Figure:
     Raises:
         SweepError: if the study's first figure is no number.
     """
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    axes = figure.add_subplot()
+    figure, (axes,) = panelled(4.4, width=6.4)
     values = heat_map(study, result)
     if values is None:
-        _points(axes, study, result)
+        first = study.axes[0]
+        places = [item["item"][first] for item in result.items]
+        if not all(isinstance(place, int | float) for place in places):
+            places = [as_text(str(place)) for place in places]
+        axes.plot(places, result.column(study.figures[0]), "o")
+        axes.set(xlabel=as_text(first), ylabel=as_text(study.figures[0]))
     else:
         _heat_map(figure, axes, study, values)
     axes.set_title(as_text(study.about), fontsize=10)
     return figure
-
-
-def _points(axes: Axes, study: Study, result: SweepResult) -> None:
-    first = study.axes[0]
-    places = [item["item"][first] for item in result.items]
-    numbers = all(isinstance(place, int | float) for place in places)
-    axes.plot(places if numbers else [as_text(str(place)) for place in places],
-              result.column(study.figures[0]), "o")  # fmt: skip
-    axes.set_xlabel(as_text(first))
-    axes.set_ylabel(as_text(study.figures[0]))
 
 
 def _heat_map(figure: Figure, axes: Axes, study: Study, values: Array) -> None:
