@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from template_control.run.velocity import VelocityCommand, VelocityRange
 from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.view.browser import PORTS, show_in_browser
 from template_control.view.live.pace import Pace
-from template_control.view.live.page import Controls, Deeds, Figures, Plots, Step, first_push
+from template_control.view.live.page import Controls, Figures, Plots, Step, first_push
 from template_control.view.live.scene import LiveScene, frame_of
 from template_control.view.live.server import PageServer
 from template_control.view.replay.playback import FRAME_RATES
@@ -82,7 +82,7 @@ class Drive:
         self.pace = Pace(experiment.world.time_step, fps)
         self.run: LiveRun | None = None
         self.paused = False
-        self._asked: deque[Callable[[], None]] = deque()
+        self._asked: deque[Any] = deque()
         self._closed = False
         self._thread: threading.Thread | None = None
         self._late = 0  # frames, until the last plot
@@ -154,42 +154,47 @@ class Drive:
 
     def _begin(self) -> None:
         """Load the robot, put up the controls, and begin the run."""
-        e, gui = self._experiment, self._server.gui
+        gui = self._server.gui
         assert isinstance(self._robot, Biped)
-        self._ranges = VelocityRange.of(self._robot)
+        self._ranges = ranges = VelocityRange.of(self._robot)
         self._restart()
         self._first = record = self._going.record()
-        self._scene = LiveScene(self._server.scene, record, ground_of(e))
+        ground = getattr(self._experiment.world, "ground", None) or Terrain.flat()
+        self._scene = LiveScene(self._server.scene, record, ground)
         self._scene.look(self._server.initial_camera)
         self._figures = Figures(record)
         run = self._going
         impulse = first_push(run.controller.parameters)
-        self._controls = Controls(gui, self._ranges, impulse, self._deeds(), run.hand.friction)
+        self._controls = Controls(gui, ranges, impulse, self._ask, run.hand.friction)
         with gui.add_folder("Plots"):
-            self._plots = Plots(gui, max(self._ranges.speeds[1], self._ranges.run))
+            self._plots = Plots(gui, max(ranges.speeds[1], ranges.run))
         self.pace.restart()
 
-    def _deeds(self) -> Deeds:
-        def asked(deed: Callable[..., None]) -> Callable[..., None]:
-            return lambda *values: self._asked.append(lambda: deed(*values))
+    def _do(self, deed: str, *values: float) -> None:
+        """Do a deed of the page's controls."""
+        hand = self._going.hand
+        deeds: dict[str, Callable[..., None]] = {
+            "velocity": hand.set_velocity,
+            "push": lambda impulse, turn: hand.push(impulse, direction=turn),
+            "friction": hand.set_friction,
+            "speed": lambda value: setattr(self.pace, "speed", value),
+            "pause": self._pause,
+            "tick": self._one_tick,
+            "step": self._one_step,
+            "reset": self._reset,
+            "save": self._save,
+        }
+        deeds[deed](*values)
 
-        return Deeds(
-            velocity=asked(lambda *velocity: self._going.hand.set_velocity(*velocity)),
-            push=asked(lambda impulse, turn: self._going.hand.push(impulse, direction=turn)),
-            friction=asked(lambda value: self._going.hand.set_friction(value)),
-            speed=asked(lambda value: setattr(self.pace, "speed", value)),
-            pause=asked(self._pause),
-            tick=asked(self._one_tick),
-            step=asked(self._one_step),
-            reset=asked(self._reset),
-            save=asked(self._save),
-        )
+    def _ask(self, deed: str, *values: float) -> None:
+        """Let the loop do a deed, which other threads ask for."""
+        self._asked.append((deed, *values))
 
     def _do_asked(self) -> None:
         """Do what the page has asked for; what cannot be done is said there."""
         while self._asked:
             try:
-                self._asked.popleft()()
+                self._do(*self._asked.popleft())
             except TemplateControlError as error:
                 self._say(str(error))
 
@@ -233,8 +238,7 @@ class Drive:
 
     def _frame(self) -> None:
         """Ticks of a frame, and what the page shows of them."""
-        halted = self.paused and self._halt_at is None
-        due = self.pace.ticks()
+        halted, due = self.paused and self._halt_at is None, self.pace.ticks()
         made = self._advance(self._single if halted else due)
         self._single = 0
         if made:
@@ -287,11 +291,6 @@ class Drive:
             f"{tick.time:.1f} s, {tick.steps} steps, {self.step.speed:.2f} m/s; **{state}**{slow}"
         )
         self._plots.draw()
-
-
-def ground_of(experiment: Experiment) -> Terrain:
-    """The ground of an experiment's world; level where the plant is one of the user's own."""
-    return getattr(experiment.world, "ground", None) or Terrain.flat()
 
 
 @checked

@@ -30,44 +30,25 @@ def first_push(p: SlipParameters) -> float:
     return round(push, 1 - int(np.floor(np.log10(push))))
 
 
-@dataclass(frozen=True)
-class Deeds:
-    """What the page's controls do; each is called by another thread than the loop's.
-
-    Attributes:
-        velocity: forward and to the left [m/s], turning [rad/s].
-        push: impulse [N s] and direction from forward to the left [rad].
-        friction: of the ground.
-        speed: seconds of the run per second.
-        pause: halts the run, or lets it go on.
-        tick, step: of a halted run, one.
-        reset: begins anew.
-        save: keeps what was driven.
-    """
-
-    velocity: Callable[[float, float, float], None]
-    push: Callable[[float, float], None]
-    friction: Callable[[float], None]
-    speed: Callable[[float], None]
-    pause: Callable[[], None]
-    tick: Callable[[], None]
-    step: Callable[[], None]
-    reset: Callable[[], None]
-    save: Callable[[], None]
-
-
 class Controls:
-    """Sliders, buttons and keys of viser's ``gui``; ``friction`` None cannot be changed."""
+    """Sliders, buttons and keys of viser's ``gui``.
+
+    ``do`` gets a deed's name and values: ``velocity`` forward, to the left [m/s] and turning
+    [rad/s]; ``push`` an impulse [N s] and its direction from forward to the left [rad];
+    ``friction``; ``speed``, seconds of the run per second; ``pause``, ``tick``, ``step``, ``reset``
+    and ``save``. It is called by another thread than the loop's. ``impulse`` is of a push at first
+    [N s], ``friction`` of the ground; None: it cannot be changed.
+    """
 
     def __init__(
         self,
         gui: Any,
         ranges: VelocityRange,
         impulse: float,
-        deeds: Deeds,
+        do: Callable[..., None],
         friction: float | None,
     ) -> None:
-        self._gui, self._ranges, self._deeds = gui, ranges, deeds
+        self._gui, self._ranges, self._do = gui, ranges, do
         self._first_push, self._friction = impulse, friction
         self.status = gui.add_markdown("")
         with gui.add_folder("Walk"):
@@ -75,7 +56,10 @@ class Controls:
         with gui.add_folder("Push"):
             self._add_pushes()
         with gui.add_folder("Time"):
-            self._add_time()
+            pace = self._slide("times real time", (0.05, 2.0), 1.0, 0.05)
+            pace.on_update(lambda _: do("speed", float(pace.value)))
+            buttons = gui.add_button_group("run", ("pause", "tick", "step", "reset", "save"))
+            buttons.on_click(lambda _: do(buttons.value))
         with gui.add_folder("Keys", expand_by_default=False):
             gui.add_markdown(
                 "W, S: faster, slower; A, D: turn; I, K, J, L: push ahead, back, to the left, to"
@@ -101,21 +85,17 @@ class Controls:
             slider.on_update(lambda _: self._want())
         self._ground = None
         if self._friction is not None:
-            self._ground = self._slide("friction", _FRICTIONS, self._friction, 0.01)
-            ground = self._ground
-            ground.on_update(lambda _: self._deeds.friction(float(ground.value)))
+            self._ground = ground = self._slide("friction", _FRICTIONS, self._friction, 0.01)
+            ground.on_update(lambda _: self._do("friction", float(ground.value)))
 
     def _want(self) -> None:
         values = [float(slider.value) for slider in self._velocity]
-        forward, left, turning = [*values, 0.0, 0.0][:3]
-        self._deeds.velocity(forward, left, turning)
+        self._do("velocity", *[*values, 0.0, 0.0][:3])
 
     def _add_pushes(self) -> None:
         free, first = bool(self._ranges.left), self._first_push
         self._impulse = self._gui.add_number("impulse [N s]", first, min=0.0, step=first / 10.0)
-        names = {"ahead": 0.0, "back": 180.0}
-        if free:
-            names |= {"left": 90.0, "right": -90.0}
+        names = {"ahead": 0.0, "back": 180.0} | ({"left": 90.0, "right": -90.0} if free else {})
         buttons = self._gui.add_button_group("push", tuple(names))
         buttons.on_click(lambda _: self._push(names[buttons.value]))
         if free:
@@ -124,32 +104,20 @@ class Controls:
             other.on_click(lambda _: self._push(float(angle.value)))
 
     def _push(self, degrees: float) -> None:
-        impulse = float(self._impulse.value)
-        if abs(degrees) == 180.0:
-            self._deeds.push(-impulse, 0.0)
-        else:
-            self._deeds.push(impulse, radians(degrees))
-
-    def _add_time(self) -> None:
-        d = self._deeds
-        pace = self._slide("times real time", (0.05, 2.0), 1.0, 0.05)
-        pace.on_update(lambda _: d.speed(float(pace.value)))
-        deeds = ("pause", "tick", "step", "reset", "save")
-        buttons = self._gui.add_button_group("run", deeds)
-        buttons.on_click(lambda _: getattr(d, buttons.value)())
+        impulse, back = float(self._impulse.value), abs(degrees) == 180.0
+        self._do("push", -impulse if back else impulse, 0.0 if back else radians(degrees))
 
     def _add_keys(self) -> None:
-        d = self._deeds
         turn = self._ranges.turning / 5.0
         keys: list[tuple[str, str, Callable[[], None]]] = [
             ("faster", "W", lambda: self._nudge(0, _STEP)),
             ("slower", "S", lambda: self._nudge(0, -_STEP)),
             ("push ahead", "I", lambda: self._push(0.0)),
             ("push back", "K", lambda: self._push(180.0)),
-            ("pause or go on", "space", d.pause),
-            ("one tick", "T", d.tick),
-            ("one step", "N", d.step),
-            ("reset", "R", d.reset),
+            ("pause or go on", "space", lambda: self._do("pause")),
+            ("one tick", "T", lambda: self._do("tick")),
+            ("one step", "N", lambda: self._do("step")),
+            ("reset", "R", lambda: self._do("reset")),
         ]
         if turn:
             keys += [
@@ -175,48 +143,32 @@ class Controls:
             self._ground.value = self._friction
 
 
-@dataclass(frozen=True)
-class _Plot:
-    """A plot over time: its title, its lines with their colours, and the least range of y."""
-
-    title: str
-    lines: tuple[tuple[str, str], ...]
-    range: tuple[float, float] | None = None
-
-
-def _plots(fastest: float) -> tuple[_Plot, ...]:
-    """Plots of a robot whose fastest speed is so much [m/s]."""
-    speeds = ("wanted", TEMPLATE), ("walked", COM)
-    return (
-        _Plot("mean speed of the last step [m/s]", speeds, (0.0, 1.2 * fastest)),
-        _Plot("torque over its limit, largest", (("left", LEFT), ("right", RIGHT)), (0.0, 1.0)),
-        _Plot("vertical force over weight", (("ground", COM), ("template", TEMPLATE))),
-    )
-
-
 class Plots:
     """Plots of the last seconds; ``gui`` is viser's, ``fastest`` the robot's speed [m/s]."""
 
     def __init__(self, gui: Any, fastest: float) -> None:
         self._rows: deque[tuple[float, ...]] = deque()
-        self._shown = _plots(fastest)
+        speeds, sides = {"wanted": TEMPLATE, "walked": COM}, {"left": LEFT, "right": RIGHT}
+        forces = {"ground": COM, "template": TEMPLATE}
+        plots: tuple[tuple[str, dict[str, str], dict[str, Any]], ...] = (
+            ("mean speed of the last step [m/s]", speeds, {"range": (0.0, 1.2 * fastest)}),
+            ("torque over its limit, largest", sides, {"range": (0.0, 1.0)}),
+            ("vertical force over weight", forces, {"auto": True}),
+        )
         empty = np.array([0.0, 1e-3])
         self._plots = [
             gui.add_uplot(
-                data=(empty, *(0.0 * empty for _ in plot.lines)),
+                data=(empty, *(0.0 * empty for _ in lines)),
                 series=(
                     {"label": "s"},
-                    *({"label": name, "stroke": color, "width": 1.5} for name, color in plot.lines),
+                    *({"label": k, "stroke": color, "width": 1.5} for k, color in lines.items()),
                 ),
-                title=plot.title,
-                scales={
-                    "x": {"time": False, "auto": True},
-                    "y": {"auto": True} if plot.range is None else {"range": plot.range},
-                },
+                title=title,
+                scales={"x": {"time": False, "auto": True}, "y": scale},
                 legend={"live": False},
                 height=_HEIGHT,
             )
-            for plot in self._shown
+            for title, lines, scale in plots
         ]
 
     def clear(self) -> None:
@@ -224,21 +176,17 @@ class Plots:
         self._rows.clear()
 
     def add(self, time: float, values: tuple[float, ...]) -> None:
-        """Add a value for each line, in the order of the plots; times [s] rise."""
+        """Add a value for each of the two lines of each plot; times [s] rise."""
         self._rows.append((time, *values))
         while self._rows[0][0] < time - _WINDOW:
             self._rows.popleft()
 
     def draw(self) -> None:
         """Send what the plots show."""
-        if len(self._rows) < 2:
-            return
-        columns = np.array(self._rows).T
-        first = 1
-        for handle, plot in zip(self._plots, self._shown, strict=True):
-            last = first + len(plot.lines)
-            handle.data = (columns[0], *columns[first:last])
-            first = last
+        if len(self._rows) >= 2:
+            time, *columns = np.array(self._rows).T
+            for i, handle in enumerate(self._plots):
+                handle.data = (time, *columns[2 * i : 2 * i + 2])
 
 
 Columns = Mapping[str, Array]
@@ -264,13 +212,9 @@ class Figures:
 
 @dataclass(frozen=True)
 class Step:
-    """Mean speed of the last step.
+    """Number of steps done, mean speed of the last one along the heading [m/s], and its end.
 
-    Attributes:
-        number: steps that are done.
-        speed: of the last one, along the heading [m/s].
-        began: when the present step was seen first [s], and x and y of the CoM then [m]; None
-            where no step was seen to begin.
+    ``began`` is when the present step was seen first [s], with x and y of the CoM [m]; or None.
     """
 
     number: int
