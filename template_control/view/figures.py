@@ -184,10 +184,9 @@ def apex_return(record: Record, look: Look = _LOOK) -> Figure:
 def _lines(record: Record, seconds: float, rows: Rows, title: str, look: Look) -> Figure:
     """Panels over time, each with values (T,), their name with its unit, and their colour."""
     curves = {name: [(of, {"color": color, "linewidth": 0.9})] for of, name, color in rows}
-    figure, panels = over_time(record, look.rows(record, seconds), curves, 0.8 + 1.7 * len(rows))
-    for axes in panels:
-        axes.axhline(0.0, color=TEMPLATE, linewidth=0.5)
-    return finish(figure, panels, f"{as_text(record.robot_name)}: {title}", look)
+    height = 0.8 + 1.7 * len(rows)
+    drawn = over_time(record, look.rows(record, seconds), curves, height, zero=True)
+    return finish(*drawn, f"{as_text(record.robot_name)}: {title}", look)
 
 
 def turning(record: Record, look: Look = _LOOK) -> Figure:

@@ -75,13 +75,20 @@ AS_TEMPLATE: dict[str, Any] = {"color": TEMPLATE, "linestyle": "--", "linewidth"
 
 
 def over_time(
-    record: Record, w: slice, rows: Mapping[str, Sequence[Curve]], height: float, **shared: Any
+    record: Record,
+    w: slice,
+    rows: Mapping[str, Sequence[Curve]],
+    height: float,
+    zero: bool = False,
+    sharey: bool = False,
 ) -> tuple[Figure, Any]:
-    """A panel over time for each row, by its name with the unit; single stance is shaded."""
-    figure, panels = panelled(height, len(rows), sharex=True, **shared)
+    """A panel over time for each row, by its name with the unit; ``zero`` has a line of its own."""
+    figure, panels = panelled(height, len(rows), sharex=True, sharey=sharey)
     for axes, (name, curves) in zip(panels, rows.items(), strict=True):
         for values, look in curves:
             axes.plot(record.time[w], values[w], **look)
+        if zero:
+            axes.axhline(0.0, color=TEMPLATE, linewidth=0.5)
         axes.set_ylabel(name)
         shade(axes, record, w)
     panels[-1].set_xlabel("time [s]")
