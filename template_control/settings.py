@@ -62,10 +62,7 @@ def read(kind: type[T], path: str | Path) -> T:
 
 
 def from_table(kind: type[T], table: Any, where: str = "") -> T:
-    """A dataclass from a table as :mod:`tomllib` reads it; a ParameterError names the key.
-
-    ``where`` is the table's own key for messages, "" for the whole file.
-    """
+    """A dataclass from a table of :mod:`tomllib`; ``where`` is its own key for messages."""
     if not isinstance(table, dict):
         raise ParameterError(f"{where} is {table!r}: give a table")
     known = {f.name: f for f in fields(kind) if f.init}  # type: ignore[arg-type]
@@ -253,10 +250,10 @@ def _read_tuple(hints: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ..
 
 
 class Leaf(NamedTuple):
-    """A key of a file that holds no table.
+    """A key of a file that holds no table, dotted, with its value's type.
 
-    ``path`` is dotted, ``hint`` its value's type; ``default`` is that of the first kind of table
-    that has the key, None where there is none, and ``about`` what the docstring of its class says.
+    ``default`` is that of the first kind of table that has the key, None where there is none, and
+    ``about`` what the docstring of its class says.
     """
 
     path: str
@@ -327,11 +324,7 @@ def _said(hint: Any) -> bool:
 
 
 def to_table(options: Any, where: str = "") -> dict[str, Any]:
-    """A dataclass as a table, with every value that TOML can hold; ``where`` is its own key.
-
-    A ParameterError names the key of a value that differs from its default and can be given in
-    Python only.
-    """
+    """A dataclass as a table; a ParameterError names a value that TOML cannot hold."""
     table: dict[str, Any] = {_KIND: options.kind} if hasattr(options, _KIND) else {}
     hints = _hints(type(options))
     for f in fields(options):

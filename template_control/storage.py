@@ -56,9 +56,8 @@ def to_jsonable(value: Any, describe: Callable[[Any], Any] | None = None) -> Any
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Path at which to write a file, so that the old one is replaced by a whole one or stays.
 
-    It is that of an empty file in the same folder, with the same ending. The file takes its name at
-    the end of the ``with`` block, and is removed if an error ends the block; an OSError becomes a
-    RecordError. A link keeps its target; a device is written directly.
+    The file takes its name at the end of the ``with`` block, and is removed if an error ends it; an
+    OSError becomes a RecordError. A link keeps its target; a device is written directly.
     """
     target = Path(os.path.realpath(path))
     partial = target.with_name(f".part-{uuid.uuid4().hex[:12]}{target.suffix}")
@@ -111,11 +110,7 @@ class Files:
 
 
 def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
-    """Write a dataclass of arrays with a ``metadata`` dictionary as a ``.npz``.
-
-    ``kind`` is what :func:`load` must ask for; ``quick`` does not compress. A RecordError if it
-    fails.
-    """
+    """Write a dataclass of arrays with a ``metadata`` dictionary as a ``.npz`` of a ``kind``."""
     arrays = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "metadata"}
     text = json.dumps({"format": kind, **record.metadata})
     write = np.savez if quick else np.savez_compressed
@@ -127,11 +122,9 @@ def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
 class Layout(NamedTuple):
     """Layout of a record's fields in its file.
 
-    Attributes:
-        fields: by name the sizes of each field's axes, such as "T nv 2". A letter is the same
-            number in all fields, "S+1" one more than "S". A last word "<nodes" says that it holds
-            indices into ``metadata["nodes"]``, "<2" that they are below 2.
-        metadata: by name the types that an entry may have.
+    ``fields`` are by name the sizes of each field's axes, such as "T nv 2": a letter is the same
+    number in all fields, "S+1" one more than "S". A last word "<nodes" says that it holds indices
+    into ``metadata["nodes"]``, "<2" that they are below 2. ``metadata`` are types by entry.
     """
 
     fields: Mapping[str, str]
@@ -144,10 +137,7 @@ def load(
     kind: str,
     layout: Layout,
 ) -> T:
-    """Record that :func:`save` wrote with the same ``kind``.
-
-    A RecordError if the file is missing or is no such record, naming the field that is wrong.
-    """
+    """Record that :func:`save` wrote with the same ``kind``; a RecordError says what is wrong."""
     try:
         values = _values(path, kind)
         _check(values, layout)
@@ -239,10 +229,7 @@ def write_text(path: str | Path, text: str) -> Path:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[Path]:
-    """Keep a folder for one command's files: made if need be, and locked meanwhile.
-
-    A RecordError if nothing can be written there, or another command writes there now.
-    """
+    """Keep a folder for one command's files: made if need be, and locked meanwhile."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         probe = folder / ".write-probe"

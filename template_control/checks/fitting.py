@@ -104,8 +104,7 @@ def check(
 ) -> Any:
     """A value as its annotation wants it: tuples for lists and arrays, plain numbers for NumPy's.
 
-    ``hint`` may be ``Annotated`` with a :class:`Range` or a :class:`Shape`; ``where`` names the
-    value in the message of ``error``, which says what would fit.
+    ``where`` names the value in the message of ``error``, which says what would fit.
     """
     try:
         return _fit(value, hint)
@@ -357,8 +356,8 @@ T = TypeVar("T")
 def asked(method: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
     """Call a method; an error goes up with the name of its class and method.
 
-    An error of this library has them in its message, any other one in a note. A planner's, route's
-    or task's own state that is not finite is no divergence of the run, but a ParameterError.
+    A planner's, route's or task's own state that is not finite is no divergence of the run, but a
+    ParameterError.
     """
     try:
         return method(*args, **kwargs)

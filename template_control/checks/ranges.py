@@ -10,11 +10,7 @@ from template_control.arrays import Array
 
 
 class Range(NamedTuple):
-    """Range of numbers; both ends belong to it unless they are said not to.
-
-    ``above`` leaves out ``low`` itself and ``below`` leaves out ``high``; ``endless`` takes inf
-    where it is an end.
-    """
+    """Range of numbers, without its ends if ``above``, ``below``; ``endless`` has an inf end."""
 
     low: float = -math.inf
     high: float = math.inf

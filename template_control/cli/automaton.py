@@ -75,11 +75,7 @@ def _check(path: Path) -> None:
 
 
 def describe(automaton: Automaton) -> dict[str, Any]:
-    """The whole automaton in JSON's types: its nodes in order, each with its edges in order.
-
-    ``starts`` names the first node of each kind of stride. Phases, slots, events, resets and
-    outcomes go by their names in ``vocabulary``. An edge has either a ``target`` or a ``failure``.
-    """
+    """The whole automaton in JSON's types: the first node of each kind of stride, and all nodes."""
     return {
         "starts": dict(automaton.starts),
         "nodes": [_describe_node(node) for node in automaton.nodes],

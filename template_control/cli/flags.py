@@ -43,12 +43,8 @@ _AROUND = Range(-360.0, 360.0)  # [deg]
 class Flag(NamedTuple):
     """A short name for keys of an experiment.
 
-    Attributes:
-        names: of the option, the one that is shown first.
-        keys: dotted; the value is set at each.
-        about: one line.
-        argument: what ``add_argument`` needs to know.
-        read: makes the keys' value of the typed one.
+    ``names`` are of the option, ``keys`` dotted; the value is set at each. ``argument`` is what
+    ``add_argument`` needs to know, ``read`` makes the keys' value of the typed one.
     """
 
     names: str

@@ -53,11 +53,7 @@ def end_quietly(number: int, frame: FrameType | None) -> None:
 
 
 def insist() -> None:
-    """Send an interrupt that Python swallows once more.
-
-    Python goes on after an exception in a callback of C code, in a finaliser or at a fork. A signal
-    that arrives while LLVM compiles, for one, is handled in its next callback.
-    """
+    """Send an interrupt that Python swallows in a callback of C code or a finaliser once more."""
     before = sys.unraisablehook
 
     def hook(unraisable: Any) -> None:

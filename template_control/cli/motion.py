@@ -36,13 +36,10 @@ _KEPT = (
 
 @dataclass(frozen=True)
 class Motion:
-    """A command that runs an experiment.
+    """A command that runs an experiment, by default ``default``.
 
-    Attributes:
-        doing: in front of the progress bar.
-        about: first sentences of the description.
-        default: experiment where no option says otherwise.
-        template: whether a scenario, named without a flag, is simulated on the template too.
+    ``doing`` is in front of the progress bar, ``about`` begins the description; ``template`` says
+    whether a scenario, named without a flag, is simulated on the template too.
     """
 
     doing: str

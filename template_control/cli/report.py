@@ -57,11 +57,7 @@ class Kept:
     files: Files
 
     def interrupted(self) -> bool:
-        """True if Ctrl-C ended the run; reports on the files, once the table is printed.
-
-        A TemplateControlError if a file could not be written, a KeyboardInterrupt if Ctrl-C came
-        while files were written.
-        """
+        """True if Ctrl-C ended the run; raises what befell its files, after the table."""
         self.files.raise_pending()
         if not self.record.interrupted:
             return False
@@ -78,9 +74,8 @@ def run_and_keep(
 ) -> Kept:
     """Do a run; write it, what repeats it, and its figures.
 
-    ``experiment`` is as it is written, ``prepared`` the same as it is run; ``doing`` is shown by
-    the progress bar. ``template`` is the same scenario on the robot's template, kept and drawn with
-    the run. If a part of the user's own fails, or answers with nonsense, that goes up as a
+    ``experiment`` is as it is written, ``prepared`` the same as it is run, ``template`` the same
+    scenario on the robot's template. If a part of the user's own fails, that goes up as a
     TemplateControlError; what was recorded until then is kept, and the traceback of any other error
     is printed.
     """

@@ -160,11 +160,7 @@ class BaseFilter:
         return np.concatenate((own, self.turning))
 
     def predict(self, turning: Array, specific_force: Array, dt: float) -> None:
-        """Advance the estimate by one tick of dt [s].
-
-        ``turning`` (a,) is read now [rad/s]; ``specific_force`` (d,) is the mean since the tick
-        before [m/s^2].
-        """
+        """Advance by dt [s], with the gyro's (a,) now, and the mean specific force (d,)."""
         o, d, trunk = self.options, self._d, self._trunk
         angle = 0.5 * (self.turning + turning) * dt
         rotation = trunk.rotation(trunk.turned(self.base, 0.5 * angle))

@@ -49,12 +49,10 @@ def add_errors(
 ) -> None:
     """Add a block's squared errors to those of each delay of whole ticks.
 
-    Args:
-        errors: (d + 1,) overwritten, of the delays up to d ticks.
-        measured: (n + 1, nv) velocities of the block's ticks, and of the next one.
-        expected: (d + 1 + n, nv) accelerations, of the ticks up to d + 1 before the block too.
-        first: of the joints among the coordinates.
-        rest: time step [s], and the bound of an error [rad/s^2].
+    ``errors`` (d + 1,) are of the delays up to d ticks, ``measured`` (n + 1, nv) velocities of the
+    block's ticks and of the next one, ``expected`` (d + 1 + n, nv) accelerations from d + 1 ticks
+    before it on; ``first`` is of the joints. ``rest`` are time step [s] and an error's bound
+    [rad/s^2].
     """
     dt, most = rest
     ticks, longest = measured.shape[0] - 1, errors.shape[0]

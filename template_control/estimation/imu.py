@@ -124,8 +124,6 @@ class ImuOptions(Checked):
 class ImuSensors:
     """Simulated sensors of a robot and its state estimate, which starts at the true state."""
 
-    exact = False
-
     def __init__(
         self,
         options: ImuOptions,

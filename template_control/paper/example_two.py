@@ -40,13 +40,11 @@ _COLORS = (TEMPLATE, RIGHT, LEFT, COM)
 
 @dataclass(frozen=True)
 class Liftoff:
-    """The first liftoff of a run; joints are lifting hip, knee, standing hip, knee.
+    """The first liftoff of a run: its direction from the foot to the CoM [rad].
 
-    Attributes:
-        beta: direction from the lifting foot to the CoM [rad].
-        load: vertical force on that foot in the last tick before [N].
-        jump: (4,) |torque| difference across the liftoff's tick [N m].
-        peak: (4,) largest |torque| from the touchdown before to the one after [N m].
+    ``load`` is the vertical force on that foot in the last tick before [N]; of lifting hip and
+    knee, standing hip and knee ``jump`` (4,) is the difference of the |torque| across the liftoff's
+    tick, ``peak`` (4,) the largest from the touchdown before to the one after [N m].
     """
 
     beta: float
@@ -191,10 +189,7 @@ _JOINTS = ("lifting hip", "lifting knee", "standing hip", "standing knee")
 
 @dataclass(frozen=True)
 class Walk:
-    """VLO states of a walk from z_0.
-
-    ``states`` (steps + 1, 3) are y [m], phi [rad], E [J]; ``fall`` is why it ended early, or "".
-    """
+    """VLO states (steps + 1, 3) y [m], phi [rad], E [J] of a walk from z_0; why it fell, or ""."""
 
     states: Array
     fall: str

@@ -19,13 +19,10 @@ from template_control.slip.parameters import SlipParameters
 
 @dataclass(frozen=True)
 class Grid:
-    """Grid over Table II's ranges, ends included.
+    """Numbers of values over Table II's ranges, ends included.
 
-    Attributes:
-        stiffness: of k0 from 10 to 25 kN/m.
-        angle: of alpha from 60 to 80 degrees.
-        speed: of dx/dt at VLO from 0.5 to 2 m/s.
-        height: of y at VLO strictly between l0 sin(alpha) and l0 (cell centres).
+    k0 is from 10 to 25 kN/m, alpha from 60 to 80 degrees, dx/dt at VLO from 0.5 to 2 m/s, and y
+    strictly between l0 sin(alpha) and l0 (cell centres).
     """
 
     stiffness: int = 10

@@ -100,11 +100,10 @@ def controlled_end(found: DeadbeatSet, gait: WalkingGait, kind: MapKind) -> Arra
 
 
 def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> BoolArray:
-    """(n,) True if passive walking from a VLO state converges to the equilibria of a branch.
+    """(n,) True if passive walking from states ``ends`` (n, 3) converges to a branch's equilibria.
 
-    The touchdown angle is that of the equilibrium with the state's energy; ``branch`` are stable
-    equilibria with the height of ``gait``, energy rising or falling. ``ends`` (n, 3) that are NaN
-    do not settle.
+    The touchdown angle is that of the equilibrium with the state's energy; the branch's are stable,
+    with the height of ``gait``. States that are NaN do not settle.
     """
     p = gait.parameters
     order = np.argsort([point.energy for point in branch])
@@ -122,11 +121,9 @@ def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> BoolAr
 def inside_share(
     found: DeadbeatSet, settled: BoolArray, least_angles: Array
 ) -> tuple[Array, float]:
-    """Share of the set's states that settle, among those with at least a given touchdown angle.
+    """Share (m,) of the states that settle (n,), of those with at least the angles (m,) [rad].
 
-    ``settled`` (n,) is from :func:`settles`; ``least_angles`` (m,) are alpha_min, the least
-    touchdown angle of the step [rad]. Returns (m,) shares, NaN where no state is left, and the
-    least angle from which all settle [rad].
+    It is NaN where no state is left. Returns also the least angle from which all settle [rad].
     """
     alpha = found.controls[:, Slot.TOUCHDOWN_ANGLE]
     shares = np.array(

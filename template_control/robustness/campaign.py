@@ -335,10 +335,7 @@ class Campaign:
 
 
 def campaign_trial(conditions: dict[str, Any], number: int) -> dict[str, Any]:
-    """One trial, as a sweep's worker runs it: fell, reason, first, speed_error of :class:`Trial`.
-
-    ``conditions`` are as :func:`~.settings.to_table` makes them; ``number`` counts from 0.
-    """
+    """One trial, as a sweep's worker runs it: fell, reason, first, speed_error."""
     _, where = settings.from_table(CampaignConfig, conditions).trial(number)
     record = simulate(where)
     return {

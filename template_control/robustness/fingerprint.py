@@ -18,8 +18,7 @@ WITHOUT = ("cli", "paper", "sweep", "view")
 def fingerprint(model: Biped, *trials: object) -> str:
     """Ten letters of a digest of the code that a trial runs, the robot's URDF and the trials.
 
-    Comments, docstrings and lines do not count, nor do the rooms ``WITHOUT``; trials are what else
-    the results depend on, by their ``repr``.
+    Comments, docstrings and the rooms ``WITHOUT`` do not count; trials go by their ``repr``.
     """
     digest = hashlib.sha256(model.urdf.encode())
     digest.update(_code(_PACKAGE).encode())

@@ -48,8 +48,8 @@ def template_limit(
     """The severest level [SI] up to which the template comes back to its gait from its section.
 
     It is back if after ``strides`` the relative errors of speed and height are below ``settled``. 0
-    if it does not come back from the mildest; None where the template has no limit of its own, as
-    to friction. The disturbance is one that changes the state at once.
+    if it does not come back from the mildest; None where it has no limit of its own, as to
+    friction.
     """
     if disturbance.kick is None:
         return None
@@ -85,8 +85,7 @@ def gait_errors(record: Record, gait: Gait) -> tuple[float, float]:
     """Relative errors of a robot's speed and height over its last 5 steps, from its gait's.
 
     Mean forward speed, of a run dx/dt at its apexes, which is what a run is asked for; and mean
-    height at the section; each over the gait's, less one. The record has at least 5 steps and no
-    fall.
+    height at the section. The record has at least 5 steps and no fall.
     """
     at_section, height = record.section_state[-_LAST:].mean(axis=0)[:2] / gait.state[:2]
     if isinstance(gait, RunningGait):

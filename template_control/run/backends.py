@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import replace
 from math import atan2, cos, degrees, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,6 +16,7 @@ from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.lateral import SIDES, LateralPlanner
 from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.ground import LEVEL, STEEPEST
+from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.robot_template import startable_slopes
@@ -42,20 +44,30 @@ from template_control.run.sensing import (
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.lateral.gait import LateralWish
 from template_control.slip.maps.section import APEX, REST, VLO
-from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
 
 class RobotBackend(ABC):
     """Backend of one kind of robot; a robot comes with it."""
 
+    def __init__(self, robot: Any) -> None:
+        self.robot = robot
+
     @abstractmethod
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """Start the controller where the run begins; (q, v) there, or a ParameterError."""
 
-    @abstractmethod
     def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
         """Sensors and estimators that give the controller its state."""
+        template, dt = controller.parameters, o.world.time_step
+        if isinstance(o.sensors, ImuOptions):
+            # On a model of its own: the controller's may be turned.
+            return ImuSensors(o.sensors, self.robot.changed(), Scale.of(template), dt)
+        return self._refined(Sensors(o.sensors, self.robot, template), controller.options, dt)
+
+    @abstractmethod
+    def _refined(self, sensors: Sensors, options: EmbeddingOptions, dt: float) -> Senses:
+        """The sensors, and what the controller makes of them."""
 
     @abstractmethod
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
@@ -74,8 +86,7 @@ def _apex_start(
 class PlanarBackend(RobotBackend):
     """See :class:`RobotBackend`."""
 
-    def __init__(self, robot: PlanarBiped) -> None:
-        self.robot = robot
+    robot: PlanarBiped
 
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
         """See :meth:`RobotBackend.start`; clear at VLO, at rest, and where legs take turns."""
@@ -84,7 +95,7 @@ class PlanarBackend(RobotBackend):
         first = controller.supervisor.begin(route.section)
         z = route.start if o.start is None else np.array(o.start)
         if pose is None and route.section == APEX:
-            pose = apex_pose(self.robot, _apex_start(controller, z, *first))
+            pose = apex_pose(robot, _apex_start(controller, z, *first))
         if pose is None and route.section == REST:
             pose = self._standing_pose(controller, o)
         if pose is not None:
@@ -112,28 +123,12 @@ class PlanarBackend(RobotBackend):
             )
         return pose
 
-    def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
-        """See :meth:`RobotBackend.senses`."""
-        parameters = controller.parameters
-        if isinstance(o.sensors, ImuOptions):
-            return _imu(o, o.sensors, self.robot, parameters)
-        delay = DelayCompensation(controller.options.delay, self.robot, o.world.time_step)
-        sensors = Sensors(o.sensors, self.robot, parameters)
-        return ForeseeingSensors(sensors, delay)
+    def _refined(self, sensors: Sensors, options: EmbeddingOptions, dt: float) -> Senses:
+        return ForeseeingSensors(sensors, DelayCompensation(options.delay, self.robot, dt))
 
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
         """See :meth:`RobotBackend.force`: what holds the robot bears the rest."""
         return (along,)
-
-
-def _imu(
-    o: Experiment,
-    options: ImuOptions,
-    robot: PlanarBiped | FloatingBaseBiped,
-    parameters: SlipParameters,
-) -> ImuSensors:
-    """The state that is estimated, on a model of its own: the controller's may be turned."""
-    return ImuSensors(options, robot.changed(), Scale.of(parameters), o.world.time_step)
 
 
 _REAR = 0  # the left foot stands where a run begins
@@ -148,69 +143,61 @@ def _stand(z: Array, width: float, apart: float) -> Pose:
     return Pose(com, np.zeros(3), feet, np.zeros((2, 3)), _REAR, momentum_speed=True)
 
 
+def _passing(lateral: LateralPlanner, z: Array, controller: EmbeddingController) -> Pose:
+    """Mid-swing: the other foot passes the stance foot at twice the CoM's speed; ``z`` (3,)."""
+    side, (away, drift) = 0.5 * lateral.wish.width, lateral.cycle.states[SIDES[_REAR].row]
+    return Pose(
+        com=np.array([0.0, side + away, z[1]]),
+        com_velocity=np.array([z[0], drift, z[2]]),
+        feet=np.array([[0.0, side, 0.0], [0.0, -side, controller.swings.other.clearance]]),
+        feet_velocity=np.array([[0.0, 0.0, 0.0], [2.0 * z[0], 0.0, 0.0]]),
+        rear=_REAR,
+        pitch=controller.first_pitch(),
+        momentum_speed=True,
+    )
+
+
 class FloatingBackend(RobotBackend):
     """See :class:`RobotBackend`."""
 
-    def __init__(self, robot: FloatingBaseBiped) -> None:
-        self.robot = robot
+    robot: FloatingBaseBiped
 
     def start(self, controller: EmbeddingController, o: PreparedExperiment) -> tuple[Array, Array]:
-        """See :meth:`RobotBackend.start`: at VLO or an apex, in the sideways motion of the gait.
-
-        Or at rest, where the feet bear the robot by themselves. A ParameterError if they do not, or
-        if the options have a planar pose.
-        """
-        route, motion = controller.supervisor.route, controller.lateral
+        """See :meth:`RobotBackend.start`: in the gait's sway, or at rest on feet that bear."""
+        robot, route, motion = self.robot, controller.supervisor.route, controller.lateral
         assert motion is not None
         if o.pose is not None:
             raise ParameterError(
-                f"{self.robot.name} has a floating base, and the run a pose of the plane: leave it"
-                " out"
+                f"{robot.name} has a floating base, and the run a pose of the plane: leave it out"
             )
-        if route.section is REST and not self.robot.half_length:
+        if route.section is REST and not robot.half_length:
             raise ParameterError(
-                f"{self.robot.name} cannot stand on two feet that are points: let its run begin at"
+                f"{robot.name} cannot stand on two feet that are points: let its run begin at"
                 " VLO or an apex"
             )
         z = route.start if o.start is None else np.array(o.start)
         first = controller.supervisor.begin(route.section)
-        planner = first[0]
-        lateral, controller.course = motion.planner, o.heading
+        planner, lateral = first[0], motion.planner
+        controller.course = o.heading
         if route.section is REST:
-            apart = CLOSING * route.parameters.rest_length if self.robot.patches else 0.0
+            apart = CLOSING * route.parameters.rest_length if robot.patches else 0.0
             lateral.wish = LateralWish(motion.step_width)
-            q, v = floating_state_in(self.robot, _stand(z, motion.stand_width, apart))
-            controller.start(_REAR, first=first)
-            return q, v
-        side_speed, rate, _ = o.heading(0.0)
-        lateral.wish = LateralWish(
-            o.course.step_width or motion.step_width,
-            left=side_speed * planner.gait.step_duration,
-            # A run leans into its turns by and by.
-            turn=rate * planner.gait.step_duration if route.section == VLO else 0.0,
-        )
-        lateral.reset(planner.gait)
-        width = lateral.wish.width
-        if route.section == APEX:
-            pose = self._apex_pose(lateral, _apex_start(controller, z, *first))
-            q, v = floating_state_in(self.robot, pose)
-            controller.start(pose.rear, pose.swung, first=first)
-            return q, v
-        away, drift = lateral.cycle.states[SIDES[_REAR].row]
-        # Mid-swing: the other foot passes the stance foot at twice the CoM's speed.
-        pose = Pose(
-            com=np.array([0.0, 0.5 * width + away, z[1]]),
-            com_velocity=np.array([z[0], drift, z[2]]),
-            feet=np.array(
-                [[0.0, 0.5 * width, 0.0], [0.0, -0.5 * width, controller.swings.other.clearance]]
-            ),
-            feet_velocity=np.array([[0.0, 0.0, 0.0], [2.0 * z[0], 0.0, 0.0]]),
-            rear=_REAR,
-            pitch=controller.first_pitch(),
-            momentum_speed=True,
-        )
-        q, v = floating_state_in(self.robot, pose)
-        controller.start(_REAR, first=first)
+            pose = _stand(z, motion.stand_width, apart)
+        else:
+            side_speed, rate, _ = o.heading(0.0)
+            lateral.wish = LateralWish(
+                o.course.step_width or motion.step_width,
+                left=side_speed * planner.gait.step_duration,
+                # A run leans into its turns by and by.
+                turn=rate * planner.gait.step_duration if route.section == VLO else 0.0,
+            )
+            lateral.reset(planner.gait)
+            if route.section == APEX:
+                pose = self._apex_pose(lateral, _apex_start(controller, z, *first))
+            else:
+                pose = _passing(lateral, z, controller)
+        q, v = floating_state_in(robot, pose)
+        controller.start(pose.rear, pose.swung, first=first)
         return q, v
 
     def _apex_pose(self, lateral: LateralPlanner, start: ApexStart) -> Pose:
@@ -236,19 +223,12 @@ class FloatingBackend(RobotBackend):
             apex_pose(self.robot, start, lambda r, pose: floating_state_in(r, lifted(pose)))
         )
 
-    def senses(self, controller: EmbeddingController, o: Experiment) -> Senses:
-        """See :meth:`RobotBackend.senses`: noise is filtered."""
-        if isinstance(o.sensors, ImuOptions):
-            return _imu(o, o.sensors, self.robot, controller.parameters)
-        sensors = Sensors(o.sensors, self.robot, controller.parameters)
-        options = controller.options
+    def _refined(self, sensors: Sensors, options: EmbeddingOptions, dt: float) -> Senses:
         tuning = options.noise_filter if isinstance(options, FreeOptions) else None
         if sensors.exact or tuning is None:
             return sensors
-        deviation = np.array(sensors.deviations)
-        return FilteredSensors(
-            sensors, NoiseFilter(self.robot, deviation, tuning), o.world.time_step
-        )
+        noise_filter = NoiseFilter(self.robot, np.array(sensors.deviations), tuning)
+        return FilteredSensors(sensors, noise_filter, dt)
 
     def force(self, along: float, lateral: float) -> tuple[float, ...]:
         """See :meth:`RobotBackend.force`: along the world's x and y; forward is the heading."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Generic, Self, TypeVar, overload
 
 import numpy as np
@@ -13,16 +13,27 @@ from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.parameters import SlipParameters
 
 T = TypeVar("T")
+_PLAIN: dict[Any, tuple[type, ...]] = {
+    str: (str,),
+    bool: (bool,),
+    float: (float, int),
+    int: (float, int),
+    dict: (dict,),
+}
 
 
 class Fact(Generic[T]):
-    """Attribute that is ``make`` of the entry ``name`` of ``metadata``, by default its own name."""
+    """Attribute that is ``make`` of the entry ``name`` of ``metadata``, by default its own name.
 
-    def __init__(self, make: Callable[[Any], T], name: str = "") -> None:
-        self._make, self._name = make, name
+    ``plain`` are the types that the entry may have.
+    """
+
+    def __init__(self, make: Callable[[Any], T], name: str = "", plain: type | None = None) -> None:
+        self._make, self.name = make, name
+        self.plain: tuple[type, ...] = (plain,) if plain else _PLAIN.get(make, (list,))
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self._name = self._name or name
+        self.name = self.name or name
 
     @overload
     def __get__(self, facts: None, owner: type) -> Self: ...
@@ -31,7 +42,7 @@ class Fact(Generic[T]):
     def __get__(self, facts: Facts, owner: type) -> T: ...
 
     def __get__(self, facts: Facts | None, owner: type) -> Self | T:
-        return self if facts is None else self._make(facts.metadata[self._name])
+        return self if facts is None else self._make(facts.metadata[self.name])
 
 
 def _indices(entry: Any) -> tuple[tuple[int, ...], ...]:
@@ -40,14 +51,6 @@ def _indices(entry: Any) -> tuple[tuple[int, ...], ...]:
 
 def _rows_of_four(entry: Any) -> Array:
     return np.array(entry).reshape(-1, 4)
-
-
-def _phases(entry: Any) -> tuple[Phase, ...]:
-    return tuple(Phase[name] for name in entry)
-
-
-def _template(entry: Mapping[str, Any]) -> SlipParameters:
-    return SlipParameters(**entry)
 
 
 class Facts:
@@ -103,9 +106,9 @@ class Facts:
     torque_limit: Fact[Array] = Fact(np.array)
     velocity_limit: Fact[Array] = Fact(np.array)
     nodes: Fact[tuple[str, ...]] = Fact(tuple)
-    phases = Fact(_phases)
+    phases = Fact(lambda names: tuple(Phase[name] for name in names))
     stiffness_slots: Fact[list[list[int | None]]] = Fact(list)
-    template = Fact(_template)
+    template = Fact(lambda entry: SlipParameters(**entry), plain=dict)
     gait_name = Fact(str, "gait")
     gait_mean_speed = Fact(float)
     gait_state: Fact[Array] = Fact(np.array)
@@ -121,7 +124,7 @@ class Facts:
     duration = Fact(float)
     wall_seconds = Fact(float)
     ticks = Fact(int)
-    summary = Fact(Statistics.read)
+    summary = Fact(Statistics.read, plain=dict)
     sections: Fact[tuple[str, ...]] = Fact(tuple)
     strides: Fact[tuple[str, ...]] = Fact(tuple)
     section_course = Fact(_rows_of_four, "courses")
@@ -135,3 +138,7 @@ class Facts:
     def fell(self) -> bool:
         """True where the run ended in a fall."""
         return bool(self.fall_reason)
+
+
+METADATA = {fact.name: fact.plain for fact in vars(Facts).values() if isinstance(fact, Fact)}
+"""Types of the entries of a run's metadata."""

@@ -19,24 +19,11 @@ from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.terrain import Terrain
 from template_control.robot.biped import leg_means
-from template_control.run.facts import Facts
+from template_control.run.facts import METADATA, Facts
 from template_control.run.tables import Quantity, quantities, to_dataframe, to_xarray
 from template_control.slip.automaton.vocabulary import Phase
 
 R = TypeVar("R", bound="Record")
-
-_METADATA: dict[str, tuple[type, ...]] = {
-    **dict.fromkeys(("robot", "urdf", "gait", "planner", "plant"), (str,)),
-    **dict.fromkeys(("fall_reason", "error"), (str,)),
-    **dict.fromkeys(("arrived", "interrupted"), (bool,)),
-    **dict.fromkeys(("mass", "trunk_com", "duration", "wall_seconds", "ticks"), (float, int)),
-    **dict.fromkeys(("gait_mean_speed", "gait_flight_share"), (float, int)),
-    **dict.fromkeys(("joints", "torque_limit", "velocity_limit", "feet", "legs"), (list,)),
-    **dict.fromkeys(("groups", "hinges", "soles", "courses"), (list,)),
-    **dict.fromkeys(("nodes", "phases", "stiffness_slots", "sections", "strides"), (list,)),
-    **dict.fromkeys(("gait_state", "gait_controls"), (list,)),
-    **dict.fromkeys(("template", "options", "summary"), (dict,)),
-}
 
 
 @dataclass(frozen=True, repr=False)
@@ -254,7 +241,7 @@ class Record(Facts):
         """
         kind = next((k for k in _kinds(cls) if _holds(path, k)), cls)
         sizes = {name: quantity.layout for name, quantity in quantities(kind).items()}
-        return storage.load(kind, path, kind.file_format, storage.Layout(sizes, _METADATA))
+        return storage.load(kind, path, kind.file_format, storage.Layout(sizes, METADATA))
 
 
 class RunInterrupted(KeyboardInterrupt):

@@ -88,15 +88,11 @@ def write_row(
     robot: tuple[Any, Array, Array],
     seen: Any,
 ) -> None:
-    """Write the row of a tick, columns of :func:`_columns`.
+    """Write the row of a tick, of :func:`_columns`; ``numbers`` are the first seven.
 
-    Args:
-        row: overwritten.
-        numbers: the first seven columns.
-        state: q, v, torques, and the ground's forces in the world (n, d) [N], of soles (n, 6) with
-            their moments about its origin [N m].
-        robot: ``data`` of the robot, its ``joint_places`` and ``heading_frame``.
-        seen: (1,) of ``SNAPSHOT``.
+    ``state`` are q, v, torques, and the ground's forces in the world (n, d) [N], of soles (n, 6)
+    with their moments about its origin [N m]; ``robot`` its ``data``, ``joint_places`` and
+    ``heading_frame``; ``seen`` (1,) of ``SNAPSHOT``.
     """
     (q, v, torque, force), (data, joints, frame) = state, robot
     r, s, at = data[0], seen[0], 0
@@ -140,10 +136,7 @@ def write_row(
 
 @compiled
 def _write_wrench(r: Any, patch: int, force: Array, frame: Array, out: Array) -> None:
-    """Write force and moment about the toe of a sole in its own axes, ``out`` (6,) [N, N m].
-
-    ``force`` (6,) is in the world, with the moment about its origin.
-    """
+    """Write a sole's (6,) force in the world in its own axes, about its toe [N, N m]."""
     c, sine, toe, heading = frame[2], frame[3], np.empty(3), np.empty(PATCH)
     _to_world(frame, r.contact_position[patch], toe, 0)
     moment = force[3:] - np.cross(toe, force[:3])

@@ -70,10 +70,6 @@ class SensorOptions(Checked):
 class Senses(Protocol):
     """Measurement of the controller's state, tick by tick."""
 
-    @property
-    def exact(self) -> bool:
-        """True if the controller gets the true state."""
-
     def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """q, v that the controller gets of the true q (nq,) [m, rad] and v (nv,) [m/s, rad/s].
 
@@ -108,34 +104,22 @@ class Sensors:
 
 
 class ForeseeingSensors:
-    """Sensors that give the state in which the torques of this tick will act.
-
-    ``sensors`` measure it; ``delay`` is learnt.
-    """
+    """Sensors that give the state in which the torques of this tick will act, by a learnt delay."""
 
     def __init__(self, sensors: Sensors, delay: DelayCompensation) -> None:
         self._sensors, self._delay = sensors, delay
-
-    @property
-    def exact(self) -> bool:
-        """See :class:`Senses`."""
-        return self._sensors.exact and self._delay.ticks == 0
+        self.expect = delay.expect
 
     def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """See :meth:`Senses.measure`."""
         return self._delay.foresee(*self._sensors.measure(q, v, contact))
 
-    def expect(self, acceleration: Array) -> None:
-        """See :meth:`Senses.expect`."""
-        self._delay.expect(acceleration)
-
 
 class ContactSensors:
     """Contact flags and forces of the feet; a share of them is wrong, drawn anew at every tick.
 
-    A wrong flag comes with the force that it stands for: a foot that seems to be in the air with
-    none, one that seems to touch with the least that counts, straight up. A foot touches the ground
-    if it carries more than the ``threshold`` [N].
+    A wrong flag comes with the force that it stands for: none, or the ``threshold`` [N] from which
+    on a foot touches the ground, straight up.
     """
 
     def __init__(self, options: SensorOptions | ImuOptions, threshold: float) -> None:
@@ -143,10 +127,7 @@ class ContactSensors:
         self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
 
     def measure(self, forces: Array) -> tuple[BoolArray, Array]:
-        """Flags (n,) and forces (n, d) as the controller gets them; without errors the true forces.
-
-        ``forces`` (n, d) are the ground's on each contact, up last [N]; they are not changed.
-        """
+        """Flags (n,) and forces (n, d), up last [N], as the controller gets them."""
         touching = forces[:, -1] > self._threshold
         if self._errors == 0.0:
             return touching, forces
@@ -173,21 +154,17 @@ class TorqueDelay:
 
 
 class FilteredSensors:
-    """Measures as :class:`~template_control.run.sensing.Sensors`, and filters the noise."""
-
-    exact = False
+    """Sensors whose noise is filtered."""
 
     def __init__(self, sensors: Sensors, noise_filter: NoiseFilter, time_step: float) -> None:
-        self._sensors = sensors
-        self._filter = noise_filter
-        self._dt = time_step
+        self._sensors, self._filter, self._dt = sensors, noise_filter, time_step
         self._expected: Array = np.zeros(1)
 
     def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
-        """As :meth:`~template_control.run.sensing.Senses.measure`."""
+        """See :meth:`Senses.measure`."""
         measured = self._sensors.measure(q, v, contact)
         return self._filter.update(measured, self._expected, contact, self._dt)
 
     def expect(self, acceleration: Array) -> None:
-        """As :meth:`~template_control.run.sensing.Senses.expect`."""
+        """See :meth:`Senses.expect`."""
         self._expected = acceleration

@@ -95,15 +95,10 @@ class Statistics:
 class Counts(NamedTuple):
     """Sums and extremes over some ticks.
 
-    Attributes:
-        torque, speed: (nu,) largest size of each joint's torque and speed [N m, rad/s].
-        torque_square: (nu,) sum of squares.
-        least, most: (nu,) of each joint's angle [rad].
-        work: of all joints, taken without its sign [J].
-        saturated, failures: ticks with a torque at its limit, and without a solved QP.
-        ticks: (2,) in stance, in flight.
-        error: (2, 2) template less robot, in stance and in flight, x and y: largest [m].
-        error_square: (2, 2) sum of squares.
+    Of each joint (nu,) largest torque and speed, sum of its squared torques, least and most angle;
+    work of all joints, taken without its sign; ticks with a torque at its limit, and without a
+    solved QP; ticks in stance and in flight (2,), and there x and y of the template less the robot
+    (2, 2), largest and sum of squares. SI units.
     """
 
     torque: Array

@@ -177,12 +177,12 @@ _ANGLES = ("roll", "pitch", "yaw")
 
 
 def floating_summary(record: FloatingRecord) -> dict[str, Any]:
-    """Summary figures of a floating-base run: attitude, heading, step width.
+    """Summary figures of a floating-base run.
 
     attitude_rms and attitude_max (roll, pitch, yaw in the heading frame [rad]), turned (of the
-    heading [rad]), mean_yaw_drift (of the trunk's mean yaw in the heading frame, from the first to
-    the last quarter of the run, over 100 steps [rad]), step_width (mean, standard deviation, least
-    [m]; None without a double stance).
+    heading [rad]), mean_yaw_drift (of the trunk's mean yaw, from the first to the last quarter of
+    the run, over 100 steps [rad]), step_width (mean, standard deviation, least [m]; None without a
+    double stance).
     """
     angles = record.attitude
     rms, most = np.sqrt(np.mean(angles**2, axis=0)), np.abs(angles).max(axis=0)

@@ -26,9 +26,9 @@ _FIRST = {"T": "time", "S": "section", "ticks": "tick"}
 class Quantity(NamedTuple):
     """Axes and SI unit of a field of a record.
 
-    ``axes`` are those of :class:`~template_control.storage.Layout`, each after the first one with
-    the dimension that it stands for, such as "T n:foot 2:axis". ``unit`` is "" where there is none,
-    or where the last dimension's labels have their own.
+    ``axes`` are those of :class:`~template_control.storage.Layout` with what each stands for, such
+    as "T n:foot 2:axis"; ``unit`` is "" where there is none, or where the last dimension's labels
+    have them.
     """
 
     axes: str

@@ -224,16 +224,11 @@ class VelocityRange:
 
 
 def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: Biped) -> Course:
-    """Where a robot is to go.
+    """Where a robot is to go at a time [s].
 
     One on pairs of feet, or held in its plane, goes along the velocity, and its trunk faces
     elsewhere. One on two flat feet goes so backward only: to the left it places its feet. One on
     two points hops backward.
-
-    Args:
-        velocity: the commanded.
-        time: from the run's start [s].
-        robot: which goes.
     """
     forward, left, turning = velocity.at(time)
     if not _places(robot):
@@ -289,16 +284,8 @@ def velocity_route(
 ) -> tuple[VelocityProfile | VelocityCommand, SpeedRoute]:
     """Route at the forward speeds of a motion, and the velocities that it and the heading read.
 
-    These are the motion's, or where it is not foreseen those of a command, which the run sets.
-
-    Args:
-        robot: its last update is overwritten.
-        motion: the velocities.
-        course: of the experiment.
-
-    Raises:
-        ParameterError: if the course has a velocity too, or when the robot cannot go where it is
-            to.
+    These are the motion's, or where it is not foreseen those of a command, which the run sets. A
+    ParameterError if the course has a velocity too, or the robot cannot go where it is to.
     """
     if course.turning_rate or course.turns or course.side_speed:
         raise ParameterError("a course does not go with velocities, which turn: leave one out")

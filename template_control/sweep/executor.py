@@ -52,10 +52,9 @@ def run_calls(
 ) -> None:
     """Submit calls to the executor and keep each outcome, also those finished before an error.
 
-    ``calls`` are index and keyword arguments; ``executor`` None stands for processes of this
-    machine, ended before this returns; ``in_flight`` calls are with the executor at a time.
-    ``keep`` gets index and outcome of each call as it finishes; ``refresh`` is called a few times a
-    second. An ExecutorLostError if the executor cannot go on.
+    ``calls`` are index and keyword arguments, of which ``in_flight`` are with the executor at a
+    time; None stands for processes of this machine. ``refresh`` is called a few times a second. An
+    ExecutorLostError if the executor cannot go on.
     """
     # Dask takes calls with equal arguments for one, whose outcome it may still hold.
     token = uuid.uuid4().hex

@@ -55,11 +55,9 @@ def _written(what: str, make: Callable[[], T]) -> T:
 class SweepFile:
     """A results file, open and locked for this process; a context manager.
 
-    A new file is begun where there is none; the file may have fewer or more items than ``items``,
-    the calls' arguments. The ``function`` counts by its name, not its code. ``finished`` are
-    outcomes by item index, as the file had them; the last of an item counts. A SweepError if the
-    file holds anything but this sweep, another process is writing it, it cannot be written, or
-    items or a partial's arguments are no plain data.
+    The file may have fewer or more items than ``items``, the calls' arguments; the ``function``
+    counts by its name, not its code. ``finished`` are outcomes by item index; the last of an item
+    counts. A SweepError if the file holds anything but this sweep, or cannot be written.
     """
 
     def __init__(

@@ -12,17 +12,9 @@ _GIVEN_UP = 0.25  # [s] what is missed beyond this is not made up for
 class Pace:
     """Clock of frames: how many ticks a frame has, and when the next one is due.
 
-    Args:
-        time_step: of a tick [s].
-        fps: frames per second of wall-clock time.
-        clock: monotonic time [s].
-        sleep: waits for some seconds.
-
-    Attributes:
-        speed: seconds of the run per second.
-        frames: so far.
-        late: frames that began more than half a frame too late.
-        worst: the longest delay of a frame [s].
+    ``time_step`` is of a tick [s], ``fps`` frames per second; ``clock`` and ``sleep`` are of
+    wall-clock time. ``speed`` is seconds of the run per second; ``late`` of the ``frames`` began
+    more than half a frame too late, the ``worst`` by so much [s].
     """
 
     def __init__(

@@ -45,16 +45,10 @@ _NONE = np.zeros(3)
 class Frame:
     """A moment of a run; x forward or as the world's, y to the left, z up [m].
 
-    Attributes:
-        q: (nq,) configuration.
-        heading: of a floating-base robot [rad].
-        com: (3,) of the robot.
-        template: (3,) of the template.
-        toes: (2, 3) of its rear and front leg.
-        loaded: (2,) whether these push.
-        foot: (n, 3) of each.
-        stands: (n,) whether the ground carries it.
-        arrow: (n, 3) the ground's force on it, drawn.
+    ``q`` (nq,) and ``heading`` [rad] of the robot, its ``com`` (3,) and the ``template``'s (3,);
+    ``toes`` (2, 3) of its rear and front leg, and whether these are ``loaded`` (2,). Of each
+    contact ``foot`` (n, 3), whether it ``stands`` (n,), and the ground's force on it as an
+    ``arrow`` (n, 3).
     """
 
     q: Array
@@ -126,16 +120,9 @@ def _turned(direction: Array) -> Array:
 
 
 class LiveScene:
-    """Scene of a robot, its template, and the ground.
+    """Scene of a robot, its template, and the ground, in viser's, of which all else is removed.
 
-    Args:
-        scene: viser's, of a server; all that is in it is removed.
-        record: of the run so far; its robot and its facts are drawn.
-        ground: that the robot walks on.
-
-    Attributes:
-        sides: (n,) how far to the left a planar robot's feet are drawn [m].
-        joints: nodes of the robot's joints.
+    ``sides`` (n,) is how far to the left a planar robot's feet are drawn [m].
     """
 
     def __init__(self, scene: Any, record: Record, ground: Terrain) -> None:

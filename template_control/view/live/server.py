@@ -34,14 +34,10 @@ def viser() -> Any:
 
 
 def is_own(host: str, origin: str | None) -> bool:
-    """True for a request of the page itself, or of a program.
+    """True for a request of the page itself, or of a program, which sends no ``origin``.
 
     A browser lets any page that it shows open a websocket here, and says in ``Origin`` whose page
     it is. A page whose name was made to lead here has that name in ``Host``.
-
-    Args:
-        host: the request's ``Host``.
-        origin: its ``Origin``; None: it has none, and no browser has sent it.
     """
     if urlsplit(f"http://{host}").hostname not in [name.strip("[]") for name in _LOCAL]:
         return False
@@ -72,18 +68,9 @@ def _closed_to_others() -> Iterator[None]:
 
 
 class PageServer:
-    """A server of viser's, for this machine only.
+    """A server of viser's, for this machine only, on a port or the first free one of :data:`PORTS`.
 
-    Args:
-        port: of the server; None: the first free one of :data:`PORTS`.
-
-    Raises:
-        MissingPackageError: if viser is not installed.
-        ParameterError: if no port is free.
-
-    Attributes:
-        viser: the server.
-        url: where a browser finds its page.
+    ``url`` is where a browser finds its page. A ParameterError if no port is free.
     """
 
     def __init__(self, port: int | None) -> None:

@@ -51,9 +51,8 @@ FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 class Stage:
     """The picture of a run, whose artists each frame moves.
 
-    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of each, down to
-    the foot; ``body`` has the places of joints and trunk in the frame that
-    is shown.
+    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of each, and
+    ``body`` has the places of joints and trunk in the frame that is shown.
     """
 
     def __init__(self, playback: Playback) -> None:
@@ -213,11 +212,7 @@ def write_film(
     fps: float,
     progress: Callable[[int], None] | None = None,
 ) -> Path:
-    """Draw every frame into a ``.gif`` or ``.mp4``, 640 x 440 dots large.
-
-    ``fps`` is that with which the frames were chosen; ``progress`` gets the number of frames done.
-    A RecordError if the ending is another, ffmpeg is missing, or the file cannot be written.
-    """
+    """Draw every frame into a ``.gif`` or ``.mp4``, 640 x 440 dots large."""
     writer = _writer(path, fps, len(playback.rows))
     with atomic_path(path) as place:
         stage = Stage(playback)

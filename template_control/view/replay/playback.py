@@ -28,10 +28,7 @@ FRAME_RATES = Range(1.0, 120.0)
 
 @dataclass(frozen=True)
 class Playback:
-    """F frames of a run: the sample of each, ``rows`` (F,), and its time ``clock`` (F,) [s].
-
-    The clock begins at the replay's beginning.
-    """
+    """Frames of a run: samples ``rows`` (F,), and the replay's time ``clock`` (F,) [s]."""
 
     record: Record
     rows: IntArray
@@ -46,12 +43,9 @@ def playback(
     start: float | None = None,
     end: float | None = None,
 ) -> Playback:
-    """Choose the frames of a replay.
+    """Choose the frames of a replay, with ``speed`` seconds of the run per second.
 
-    ``fps`` [1/s] is from 1 to 120, ``speed``, in seconds of the run per second of the replay, from
-    0.01 to 100. ``start`` and ``end`` are of the part to show [s], negative from the run's end;
-    None for its beginning and end. A ParameterError if a number is out of its range, a RecordError
-    if the run cannot be shown.
+    ``start`` and ``end`` are of the part to show [s], negative from the run's end; None for all.
     """
     check("speed", speed, Annotated[float, SPEEDS])
     check("fps", fps, Annotated[float, FRAME_RATES])
@@ -108,7 +102,7 @@ def coil(shape: Array, begin: Array, end: Array) -> Array:
 
 
 def force_arrows(force: Array, on: BoolArray, weight: float, length: float) -> Array:
-    """The ground's forces (..., d) [N] as arrows [m], zero where a foot is not ``on`` the ground.
+    """Forces (..., d) [N] as arrows [m], zero where a foot is not ``on`` the ground.
 
     The ``weight`` [N] is 0.4 of the rest ``length`` [m] long. An arrow longer than two weights, at
     an impact, is cut to that.

@@ -26,11 +26,7 @@ _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 @dataclass(frozen=True)
 class Visual:
-    """One shape of the robot, with a name that is unique in it and a geometry for meshcat.
-
-    ``offset`` (4, 4) is of meshcat's shape in the URDF's visual frame; ``color`` is red, green,
-    blue, opacity, each from 0 to 1.
-    """
+    """One shape of the robot for meshcat, at ``offset`` (4, 4) in the URDF's visual frame."""
 
     name: str
     geometry: mg.Geometry
@@ -46,7 +42,7 @@ def load_visuals(record: Record) -> Robot:
     """The robot of a run, and its shapes in the geometry model's order.
 
     A mesh that is missing or cannot be read is left out. Legs and trunk that have no shape then are
-    drawn as sticks. A RecordError if the run carries no URDF.
+    drawn as sticks.
     """
     text = record.urdf
     if not text:

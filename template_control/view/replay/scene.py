@@ -36,20 +36,17 @@ _AROUND = 11  # places that a height is the mean of
 
 
 def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, IntArray]:
-    """Level rectangles: vertices (4 N, 3) and faces (2 N, 3) from centres (N, 3) [m].
-
-    ``size`` is along x and y [m].
-    """
+    """Level rectangles of a size about centres (N, 3) [m]: vertices (4 N, 3), faces (2 N, 3)."""
     corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
     return (centres[:, None] + corners).reshape(-1, 3), faces.reshape(-1, 3)
 
 
 def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tuple[Any, Array]:
-    """The ground under a line, a board where it is level, else its surface; its (4, 4) placement.
+    """The ground under a line (N, 2), a board where it is level, and its (4, 4) placement.
 
-    ``line`` (N, 2) is x and height of its points [m], ``sides`` y of its right and its left edge
-    [m], ``length`` the template's rest length [m].
+    ``sides`` are y of its right and its left edge [m], ``length`` is the template's rest length
+    [m].
     """
     place = np.eye(4)
     (low, level), (high, _), (right, left) = line[0], line[-1], sides
@@ -61,10 +58,7 @@ def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tupl
 
 
 def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, IntArray]:
-    """A surface across a line: vertices (2 N, 3) and faces (2 N - 2, 3).
-
-    Arguments as for :func:`ground_shape`.
-    """
+    """A surface across a line; see :func:`ground_shape`: (2 N, 3) vertices, (2 N - 2, 3) faces."""
     count, first = len(line), np.arange(len(line) - 1)
     edges = [np.insert(line, 1, y, axis=1) for y in sides]
     near = np.column_stack((first, first + 1, first + count))
@@ -85,13 +79,9 @@ _LANDED = 0.015  # [s] after its touchdown a foot rests
 class Space:
     """Places of CoM, legs and feet; x forward or as the world's, y to the left, z up [m].
 
-    Attributes:
-        com: (T, 3) of the robot.
-        template: (T, 3) the template's CoM.
-        toes: (T, 2, 3) of the template's rear and front leg.
-        foot: (T, n, 3) of each.
-        arrow: (T, n, 3) the ground's force on each foot, drawn.
-        stood: for each foot (n, 3) where it stood, and (n,) since when [s].
+    ``com`` (T, 3) of the robot and of the ``template``, ``toes`` (T, 2, 3) of its rear and front
+    leg, each ``foot`` (T, n, 3) and the ground's force on it as an ``arrow`` (T, n, 3); ``stood``
+    are for each foot (n, 3) where it stood, and (n,) since when [s].
     """
 
     com: Array
@@ -121,10 +111,9 @@ def in_space(record: Record, sides: Array) -> Space:
 
 
 def points(fields: Mapping[str, Any], sides: Array) -> tuple[Array, ...]:
-    """CoM, template's CoM, toes, feet, and the ground's forces on these, in three directions.
+    """(T, 3) CoM and template's CoM, (T, n, 3) toes, feet, and the ground's forces on these.
 
-    ``fields`` are those of a record, by name, ``sides`` (feet,) is how far to the left a planar
-    robot's feet are [m]. CoM and template are (T, 3), the others (T, n, 3).
+    ``fields`` are those of a record, by name; planar feet are ``sides`` (feet,) to the left [m].
     """
     if "space_com" in fields:
         away, heading = fields["template_com"] - fields["com"], fields["heading"]
