@@ -32,8 +32,7 @@ _hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 T = TypeVar("T")
 
 _KIND = "kind"
-PYTHON_ONLY = {"python_only": True}
-"""Metadata of a field that a file leaves out."""
+PYTHON_ONLY = {"python_only": True}  # metadata of a field that a file leaves out
 
 _NUMBERS = re.compile(r"""\[\n((?:\ +[^\s"'\[\]{},]+,\n)+)\ *\]""")
 """A list of numbers, one a line, as ``tomli_w`` writes it: texts have quotes, and no line break."""
@@ -117,8 +116,7 @@ def changed(options: T, keys: Mapping[str, Any]) -> T:
     return _changed(options, [(tuple(key.split(".")), value) for key, value in keys.items()], "")
 
 
-_Entries = list[tuple[tuple[str, ...], Any]]
-"""Values by path."""
+_Entries = list[tuple[tuple[str, ...], Any]]  # values by path
 
 
 def _changed(options: T, entries: _Entries, where: str) -> T:

@@ -15,8 +15,7 @@ from template_control.checks.typed import parsed
 SPEED = Range(0.01, 10.0)
 """Of a gait that is asked for [m/s]; whether there is one is decided later."""
 SEED = Range(0, 2**63 - 1)
-MANY = Range(1, 1_000_000)
-"""Of things that are simulated or drawn one by one."""
+MANY = Range(1, 1_000_000)  # of things that are simulated or drawn one by one
 
 
 def number(within: Range) -> Callable[[str], float]:

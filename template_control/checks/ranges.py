@@ -83,13 +83,11 @@ NotNegative = Annotated[float, Range(0.0)]
 Share = Annotated[float, Range(0.0, 1.0)]
 Speed = Annotated[float, Range(0.0, 20.0, above=True)]
 """Wanted of a walk or a run [m/s]; twice that of the fastest runner."""
-SpeedOrRest = Annotated[float, Range(0.0, 20.0)]
-"""Of a walk, a run or a stand [m/s]."""
+SpeedOrRest = Annotated[float, Range(0.0, 20.0)]  # of a walk, a run or a stand [m/s]
 Angle = Annotated[float, Range(0.0, math.pi / 2.0, above=True, below=True)]
 Degrees = Annotated[float, Range(0.0, 90.0, above=True, below=True)]
 """Of a leg's angle to the ground, where a user types it."""
-Count = Annotated[int, Range(1, 1_000_000)]
-"""Of things that are made or simulated one by one."""
+Count = Annotated[int, Range(1, 1_000_000)]  # of things that are made or simulated one by one
 Index = Annotated[int, Range(0)]
 Interval = Annotated[tuple[float, float], Rising()]
 Vector = Annotated[Array, Shape((None,))]

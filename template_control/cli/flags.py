@@ -431,5 +431,4 @@ LENGTH = (
 SUBJECT = (*ROBOT, *MASSES, *OWN_URDF, SCENARIO, *GAIT, *PLANNER, *WORLD)
 """Flags of an undisturbed experiment."""
 
-ALL = (*SUBJECT, *STANDS, *DISTURBANCES, *COURSE, *LENGTH)
-"""Flags of a run."""
+ALL = (*SUBJECT, *STANDS, *DISTURBANCES, *COURSE, *LENGTH)  # flags of a run

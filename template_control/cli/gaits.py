@@ -55,15 +55,6 @@ class _Defaults(NamedTuple):
     target: float
 
 
-class _Wanted(NamedTuple):
-    gait: str
-    fixed: dict[str, float]
-    start: dict[str, float]
-    over: str
-    limits: tuple[float, float]
-    step: float
-
-
 _DEFAULTS = {
     "walk": _Defaults(
         {"speed": 1.148, "height": 0.9818, "angle": 70.0, "stiffness": 16.5e3},
@@ -154,51 +145,50 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         ParameterError: naming the option that is out of its range or does not fit another.
     """
-    wanted = _wanted(options)
+    _complete(options)
     with nullcontext() if options.no_figures else writing(options.output) as folder:
-        if wanted is None:
+        if options.family:
             return make_family(folder, options.json)
-        return _branch(options, wanted, folder)
+        return _branch(options, folder)
 
 
-def _wanted(options: argparse.Namespace) -> _Wanted | None:
-    """The branch that was asked for; None for the family by speed."""
+def _complete(options: argparse.Namespace) -> None:
+    """Check options of a branch, and set those that are not given: quantities by their names."""
     if options.family:
         idle = [n for n in ("fix", "controlled", "start", "limits") if getattr(options, n)]
         if idle:
             raise ParameterError(f"--{idle[0]} does not go with --family: leave one out")
-        return None
+        return
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
-    limits = (options.limits[0], options.limits[1]) if options.limits else defaults.limits
     if options.limits is None and options.over != "energy":
         raise ParameterError(f"--over {options.over} needs --limits: give its range")
-    for limit in limits:
+    low, high = options.limits or defaults.limits
+    for limit in (low, high):
         check("--limits", limit, _TYPED[options.over])
-    if not limits[0] < limits[1]:
-        raise ParameterError(f"--limits are {limits[0]:g} and {limits[1]:g}: give low, then high")
-    held = given or (defaults.held if options.controlled else defaults.fixed)
+    if not low < high:
+        raise ParameterError(f"--limits are {low:g} and {high:g}: give low, then high")
     start = _quantities("--start", options.start)
     if options.controlled and options.limits is None:
         start.setdefault(options.over, defaults.target)
-    return _Wanted(options.gait, held, start, options.over, limits, options.step)
+    held = defaults.held if options.controlled else defaults.fixed
+    options.fix, options.start, options.limits = given or held, start, (low, high)
 
 
-def _branch(options: argparse.Namespace, wanted: _Wanted, folder: Path | None) -> int:
+def _branch(options: argparse.Namespace, folder: Path | None) -> int:
     """Follow one branch, with its figure in ``folder``."""
-    held = wanted.fixed
     if options.controlled:
-        points = _controlled(wanted, _MAPS[options.controlled])
-        show = [*held, "angle"]
+        points = _controlled(options, _MAPS[options.controlled])
+        shown = [*options.fix, "angle"]
     else:
-        points = _passive(wanted)
-        show = [q for q in QUANTITIES if q not in held and q != options.over]
+        points = _passive(options)
+        shown = [q for q in QUANTITIES if q not in options.fix and q != options.over]
     files = Files()
-    path = None
+    paths: list[Path] = []
     if folder is not None:
-        figure = branch_figure(points, options.over, show, bool(options.controlled))
+        figure = branch_figure(points, options.over, shown, bool(options.controlled))
         path = files.write(lambda: save_figure(figure, folder / "branch.png"))
-    paths = [] if path is None else [path]
+        paths = [] if path is None else [path]
     if options.json:
         print(json.dumps({"points": [_data(p) for p in points], "figures": list(map(str, paths))}))
     else:
@@ -207,33 +197,33 @@ def _branch(options: argparse.Namespace, wanted: _Wanted, folder: Path | None) -
     return 0
 
 
-def _passive(wanted: _Wanted) -> list[BranchPoint]:
-    fixed = {name: _si(name, value) for name, value in wanted.fixed.items()}
-    family = Family(SlipParameters(), _STRIDES[wanted.gait], fixed)
-    start = {**_DEFAULTS[wanted.gait].start, **wanted.fixed, **wanted.start}
+def _passive(options: argparse.Namespace) -> list[BranchPoint]:
+    fixed = {name: _si(name, value) for name, value in options.fix.items()}
+    family = Family(SlipParameters(), _STRIDES[options.gait], fixed)
+    start = {**_DEFAULTS[options.gait].start, **options.fix, **options.start}
     guess = [start["speed"], start["height"], 0.0][: family.n]
     x = np.array([*guess, np.radians(start["angle"]), start["stiffness"]])
-    low, high = (_si(wanted.over, v) for v in wanted.limits)
-    return family.trace(x, wanted.over, (low, high), step=wanted.step)
+    low, high = (_si(options.over, v) for v in options.limits)
+    return family.trace(x, options.over, (low, high), step=options.step)
 
 
-def _controlled(wanted: _Wanted, kind: MapKind) -> list[BranchPoint]:
-    held, varied = wanted.fixed, wanted.over
+def _controlled(options: argparse.Namespace, kind: MapKind) -> list[BranchPoint]:
+    held, varied = options.fix, options.over
     if len(held) != 1 or not {*held, varied} <= set(VARIED) or varied in held:
         raise ParameterError(
             f"--controlled holds {', '.join(held)} and moves {varied}: --fix one of"
             f" {', '.join(VARIED)} and give another to --over"
         )
-    p, walking = SlipParameters(), wanted.gait == "walk"
+    p, walking = SlipParameters(), options.gait == "walk"
     section = VLO if walking else APEX
     controller = ModifiedWalking(p, kind) if walking else ActiveRunning(p, kind)
-    start = {**_DEFAULTS[wanted.gait].start, **wanted.start}
+    start = {**_DEFAULTS[options.gait].start, **options.start}
     guess = controls(np.radians(start["angle"]), start["stiffness"], start["stiffness"])
     policy = targeted(controller, p, section, held, varied, guess)
-    family = ControlledFamily(ReturnMap(p, _STRIDES[wanted.gait]), policy, varied)
-    value = wanted.start.get(varied, 0.5 * sum(wanted.limits))
+    family = ControlledFamily(ReturnMap(p, _STRIDES[options.gait]), policy, varied)
+    value = options.start.get(varied, 0.5 * sum(options.limits))
     x = np.append(section_target(p, section, {**held, varied: value}), value)
-    return family.trace(x, "target", wanted.limits, step=wanted.step)
+    return family.trace(x, "target", options.limits, step=options.step)
 
 
 def _si(name: str, value: float) -> float:
@@ -243,14 +233,14 @@ def _si(name: str, value: float) -> float:
 def _quantities(option: str, pairs: list[str] | None) -> dict[str, float]:
     """``QUANTITY=VALUE`` as numbers, the angle in degrees; a ParameterError names a bad one."""
     found = typed.entries(option, pairs or [], "QUANTITY=VALUE, such as height=0.98")
-    for name in found:
+    numbers = {}
+    for name, text in found.items():
         if name not in QUANTITIES:
             raise ParameterError(
                 f"{option} {name} names no quantity: give one of {', '.join(QUANTITIES)}"
             )
-    return {
-        name: typed.number(f"{option} {name}", text, _TYPED[name]) for name, text in found.items()
-    }
+        numbers[name] = typed.number(f"{option} {name}", text, _TYPED[name])
+    return numbers
 
 
 def _data(point: BranchPoint) -> dict[str, Any]:
@@ -277,9 +267,8 @@ def _print(points: list[BranchPoint], gait: str, over: str, paths: list[Path]) -
         values = [_number(name, point.quantity(name)) for name in QUANTITIES]
         text = point.special.name.lower() if point.special else point.kind.value
         rows.append([*target, *values, _eigenvalues(point), text])
-    found = table(
-        f"branch of {gait} gaits, {len(points)} points", columns, rows, left=0, box=SIMPLE_HEAD
-    )
+    title = f"branch of {gait} gaits, {len(points)} points"
+    found = table(title, columns, rows, left=0, box=SIMPLE_HEAD)
     found.columns[-1].justify = "left"
     show(found, lines=(f"figure: {path}" for path in paths))
 
@@ -301,6 +290,27 @@ def _eigenvalues(point: BranchPoint) -> str:
 Chains = tuple[list[Member], ...]
 
 _TABLE_STEP = 0.1  # [m/s]
+Column = tuple[str, str, Callable[[WalkingGait, Figures], float]]
+# Label in the figure; header and format in the table, if it is there; value.
+_SHOWN: tuple[Column, ...] = (
+    ("mean speed [m/s]", "m/s .3f", lambda g, _: g.mean_speed),
+    ("leg stiffness [kN/m]", "k kN/m .2f", lambda g, _: 1e-3 * g.parameters.leg_stiffness),
+    (
+        "touchdown angle [deg]",
+        "alpha .2f",
+        lambda g, _: math.degrees(g.controls[Slot.TOUCHDOWN_ANGLE]),
+    ),
+    ("height at VLO [m]", "y m .4f", lambda g, _: g.vlo[1]),
+    ("step length [m]", "step m .3f", lambda g, _: g.step_length),
+    ("step duration [s]", "step s .3f", lambda g, _: g.step_duration),
+    ("least singular value of B", "", lambda _, f: f.authority),
+    ("share of double stance", "", lambda _, f: f.double_stance),
+)
+_EIGENVALUES: tuple[Column, ...] = (
+    ("passive", "passive .2f", lambda _, f: f.passive),
+    ("three controls", "3 u .2f", lambda _, f: f.without),
+    ("with push-off", "4 u .2f", lambda _, f: f.closed),
+)
 
 
 def make_family(folder: Path | None, as_json: bool) -> int:
@@ -310,7 +320,8 @@ def make_family(folder: Path | None, as_json: bool) -> int:
     paths: list[Path | None] = []
     if folder is not None:
         text = json.dumps(data, indent=1) + "\n"
-        figure = speed_family_figure(*_curves(chains))
+        pairs = {"largest |eigenvalue|": _curves(chains, _EIGENVALUES)}
+        figure = speed_family_figure(_curves(chains, _SHOWN), pairs)
         paths = [
             files.write(lambda: storage.write_text(folder / "walking.json", text)),
             files.write(lambda: save_figure(figure, folder / "by_speed.png")),
@@ -323,49 +334,22 @@ def make_family(folder: Path | None, as_json: bool) -> int:
     return 0
 
 
-def _curves(chains: Chains) -> tuple[dict[str, list[Array]], dict[str, dict[str, list[Array]]]]:
-    def of(value: Callable[[WalkingGait, Figures], float]) -> list[Array]:
-        return [np.array([value(*member) for member in chain]) for chain in chains]
-
-    quantities = {
-        "mean speed [m/s]": of(lambda g, _: g.mean_speed),
-        "leg stiffness [kN/m]": of(lambda g, _: 1e-3 * g.parameters.leg_stiffness),
-        "touchdown angle [deg]": of(lambda g, _: _degrees(g)),
-        "height at VLO [m]": of(lambda g, _: g.vlo[1]),
-        "step length [m]": of(lambda g, _: g.step_length),
-        "step duration [s]": of(lambda g, _: g.step_duration),
-        "least singular value of B": of(lambda _, f: f.authority),
-        "share of double stance": of(lambda _, f: f.double_stance),
+def _curves(chains: Chains, columns: tuple[Column, ...]) -> dict[str, list[Array]]:
+    return {
+        label: [np.array([value(*member) for member in chain]) for chain in chains]
+        for label, _, value in columns
     }
-    eigenvalues = {
-        "passive": of(lambda _, f: f.passive),
-        "three controls": of(lambda _, f: f.without),
-        "with push-off": of(lambda _, f: f.closed),
-    }
-    return quantities, {"largest |eigenvalue|": eigenvalues}
-
-
-def _degrees(gait: WalkingGait) -> float:
-    return math.degrees(gait.controls[Slot.TOUCHDOWN_ANGLE])
 
 
 def _print_family(chains: Chains, paths: list[Path]) -> None:
-    columns = ("m/s", "k kN/m", "alpha", "y m", "step m", "step s", "passive", "3 u", "4 u")
+    columns = [(how.rpartition(" "), of) for _, how, of in (*_SHOWN, *_EIGENVALUES) if how]
     rows, wanted = [], 0.0
-    for gait, f in (member for chain in chains for member in chain):
-        if gait.mean_speed < wanted:
-            continue
-        wanted = _TABLE_STEP * (np.floor(gait.mean_speed / _TABLE_STEP) + 1.0)
-        row = (
-            f"{gait.mean_speed:.3f}",
-            f"{1e-3 * gait.parameters.leg_stiffness:.2f}",
-            f"{_degrees(gait):.2f}",
-            f"{gait.vlo[1]:.4f}",
-            f"{gait.step_length:.3f}",
-            f"{gait.step_duration:.3f}",
-            *(f"{size:.2f}" for size in (f.passive, f.without, f.closed)),
-        )
-        rows.append(row)
+    for member in (member for chain in chains for member in chain):
+        speed = member[0].mean_speed
+        if speed >= wanted:
+            wanted = _TABLE_STEP * (np.floor(speed / _TABLE_STEP) + 1.0)
+            rows.append([format(of(*member), form) for (_, _, form), of in columns])
     title = "walking gaits by speed, for 80 kg and l0 = 1 m; largest eigenvalues"
-    found = table(title, columns, rows, left=0, box=SIMPLE_HEAD)
+    headers = [header for (header, _, _), _ in columns]
+    found = table(title, headers, rows, left=0, box=SIMPLE_HEAD)
     show(found, lines=(f"written: {path}" for path in paths))

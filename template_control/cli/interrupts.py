@@ -10,8 +10,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import Any
 
-INTERRUPTED = 130
-"""Exit status after Ctrl-C, as shells have it."""
+INTERRUPTED = 130  # exit status after Ctrl-C, as shells have it
 
 _AGAIN = 0.02  # [s] after which an interrupt is tried again: a callback is over by then
 _STDERR = 2

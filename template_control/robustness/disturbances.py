@@ -126,11 +126,9 @@ class Disturbance:
         return f"{self.unit.factor * level:.3g} {self.unit.name}".strip()
 
 
-BEGIN = 10
-"""Steps on the gait before a push comes."""
+BEGIN = 10  # steps on the gait before a push comes
 
-AFTER = 20
-"""Steps a robot must go on after it, or with a lasting one from the start."""
+AFTER = 20  # steps a robot must go on after it, or with a lasting one from the start
 
 PHASES = 10
 """Of the step in which a push begins: as many trials."""
@@ -138,8 +136,7 @@ PHASES = 10
 _SOON = 4  # steps of a robot that starts off its gait before a step of the ground comes
 _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
-PUSH_SECONDS = 0.1
-"""Duration of a push on the reference template [s]."""
+PUSH_SECONDS = 0.1  # duration of a push on the reference template [s]
 
 _TIME_STEP = PlantOptions().time_step
 
@@ -184,10 +181,7 @@ def _step(name: str, title: str, sign: float) -> Disturbance:
         world = with_step(engine(where), sign * level, edge)
         return replace(where, steps=_SOON + 1 + AFTER, world=world, start=start)
 
-    def size(parameters: SlipParameters) -> float:
-        return Scale.of(parameters).length
-
-    levels = _HEIGHTS, len(_EDGES), size
+    levels = _HEIGHTS, len(_EDGES), lambda p: Scale.of(p).length
     return Disturbance(name, title, _CENTIMETRES, *levels, stepped, passing=True)
 
 
@@ -209,28 +203,8 @@ def _lasting(
     return Disturbance(name, title, unit, levels, _STARTS, size, disturbed, grain=grain)
 
 
-def _slippery(where: PreparedExperiment, level: float, _: int) -> dict[str, Any]:
-    return {"world": replace(engine(where), friction=level)}
-
-
 def _other_mass(where: PreparedExperiment, level: float, _: int) -> dict[str, Any]:
     return {"world": replace(engine(where), mass_scale=1.0 + level)}
-
-
-def _weak(where: PreparedExperiment, level: float, _: int) -> dict[str, Any]:
-    return {"controller": replace(where.tuning, torque_scale=level)}
-
-
-def _noisy(_: PreparedExperiment, level: float, trial: int) -> dict[str, Any]:
-    return {"sensors": SensorOptions(noise=level, seed=trial)}
-
-
-def _late(_: PreparedExperiment, level: float, __: int) -> dict[str, Any]:
-    return {"delay": level}
-
-
-def _time(parameters: SlipParameters) -> float:
-    return Scale.of(parameters).time
 
 
 DISTURBANCES: tuple[Disturbance, ...] = (
@@ -238,15 +212,25 @@ DISTURBANCES: tuple[Disturbance, ...] = (
     _push("push-backward", "push backward", -1.0),
     _step("step-up", "step up", 1.0),
     _step("step-down", "step down", -1.0),
-    _lasting("friction", "friction", Unit(""), _ladder(-0.05, 13, 0.7), _slippery),
+    _lasting(
+        "friction", "friction", Unit(""), _ladder(-0.05, 13, 0.7),
+        lambda where, level, _: {"world": replace(engine(where), friction=level)},
+    ),
     _lasting("heavier", "heavier", _PER_CENT, _ladder(0.1, 15), _other_mass),
     _lasting("lighter", "lighter", Unit("%", -100.0), _ladder(-0.1, 9), _other_mass),
-    _lasting("torque", "torque limits", _PER_CENT, _ladder(-0.05, 19, 1.0), _weak),
-    _lasting("noise", "sensor noise", Unit("mrad", 1e3), _ladder(5e-4, 20), _noisy),
     _lasting(
-        "delay", "control delay", Unit("ms", 1e3), _ladder(2e-3, 25), _late, _time, _TIME_STEP
+        "torque", "torque limits", _PER_CENT, _ladder(-0.05, 19, 1.0),
+        lambda where, level, _: {"controller": replace(where.tuning, torque_scale=level)},
     ),
-)
+    _lasting(
+        "noise", "sensor noise", Unit("mrad", 1e3), _ladder(5e-4, 20),
+        lambda _, level, trial: {"sensors": SensorOptions(noise=level, seed=trial)},
+    ),
+    _lasting(
+        "delay", "control delay", Unit("ms", 1e3), _ladder(2e-3, 25),
+        lambda _, level, __: {"delay": level}, lambda p: Scale.of(p).time, _TIME_STEP,
+    ),
+)  # fmt: skip
 """All that are measured, in the order they are shown in."""
 
 LATERAL_PUSHES: tuple[Disturbance, ...] = (

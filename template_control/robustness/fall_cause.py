@@ -35,51 +35,38 @@ def fall_cause(record: Record) -> str:
     """
     begin = record.section_time[max(len(record.section_time) - _LOOKED_AT, 0)]
     since = int(np.searchsorted(record.time, begin))
-    found = {}
-    for name, look in _LOOKS.items():
-        wrong = np.flatnonzero(look(record)[since:])
-        if len(wrong):
-            found[name] = int(wrong[0])
+    wrong = {name: look(record)[since:] for name, look in _LOOKS.items()}
+    found = {name: int(np.argmax(of)) for name, of in wrong.items() if of.any()}
     return min(found, key=lambda name: found[name]) if found else "none of these"
 
 
 def _bears(record: Record) -> BoolArray:
     """(T, n) which feet are loaded."""
-    weight = record.weight
-    return np.asarray(record.contact_force[:, :, 1] > _BEARS * weight)
-
-
-def _failed(record: Record) -> BoolArray:
-    return ~np.asarray(record.solved, dtype=bool)
+    return np.asarray(record.contact_force[:, :, 1] > _BEARS * record.weight)
 
 
 def _limited(record: Record) -> BoolArray:
     at_limit = np.abs(record.torque) >= _LIMIT * record.torque_limit
-    long = _AT_LIMIT * Scale.of(record.template).time
-    wrong = np.zeros(len(record.time), dtype=bool)
-    for joint in at_limit.T:
-        wrong |= _lasts(joint, record.time) >= long
-    return wrong
+    long, time = _AT_LIMIT * Scale.of(record.template).time, record.time
+    lasts = [np.where(on, time - _at_begin(time, on), 0.0) for on in at_limit.T]
+    return np.asarray(np.max(lasts, axis=0) >= long)
 
 
 def _slipped(record: Record) -> BoolArray:
     wrong = np.zeros(len(record.time), dtype=bool)
-    for foot, bears in enumerate(_bears(record).T):
-        if isinstance(record, FloatingRecord):
-            place = record.space_foot[:, foot, :2]
-        else:
-            place = record.foot[:, foot, :1]
-        slid = np.linalg.norm([x - _at_begin(x, bears) for x in place.T], axis=0)
+    places = record.foot[..., :1]
+    if isinstance(record, FloatingRecord):
+        places = record.space_foot[..., :2]
+    for place, bears in zip(places.swapaxes(0, 1), _bears(record).T, strict=True):
+        slid = np.linalg.norm(place - _at_begin(place, bears), axis=1)
         wrong |= bears & (slid > _SLIP * record.template.rest_length)
     return wrong
 
 
 def _stumbled(record: Record) -> BoolArray:
-    friction = record.options["plant"].get("friction", np.inf)
-    weight = record.weight
-    force = record.contact_force
-    pressed = -force[:, :, 0] > np.maximum(_WALL * friction * force[:, :, 1], _BEARS * weight)
-    return np.asarray(pressed.any(axis=1))
+    friction, force = record.options["plant"].get("friction", np.inf), record.contact_force
+    least = np.maximum(_WALL * friction * force[:, :, 1], _BEARS * record.weight)
+    return np.asarray((-force[:, :, 0] > least).any(axis=1))
 
 
 def _stretched(record: Record) -> BoolArray:
@@ -100,11 +87,6 @@ def _late(record: Record) -> BoolArray:
     return np.asarray(waited > _LATE * usual)
 
 
-def _lasts(true: BoolArray, time: Array) -> Array:
-    """(T,) for how long it has been true."""
-    return np.where(true, time - _at_begin(time, true), 0.0)
-
-
 def _at_begin(value: Array, true: BoolArray) -> Array:
     """(T,) the value where the present stretch of ``true`` began; undefined outside of it."""
     begins = true & ~np.concatenate(([False], true[:-1]))
@@ -113,7 +95,7 @@ def _at_begin(value: Array, true: BoolArray) -> Array:
 
 
 _LOOKS: dict[str, Callable[[Record], BoolArray]] = {
-    "failed QP": _failed,
+    "failed QP": lambda record: ~record.solved,
     "torque limit": _limited,
     "slip": _slipped,
     "stumble": _stumbled,

@@ -11,8 +11,7 @@ from template_control.robot.biped import Biped
 
 _PACKAGE = Path(__file__).resolve().parents[1]
 _LETTERS = 10
-WITHOUT = ("cli", "paper", "sweep", "view")
-"""Rooms that no trial's result depends on."""
+WITHOUT = ("cli", "paper", "sweep", "view")  # rooms that no trial's result depends on
 
 
 def fingerprint(model: Biped, *trials: object) -> str:

@@ -169,7 +169,9 @@ def measure(
     where = experiment.prepare()
     gait = where.gait
     undisturbed = _undisturbed(where, experiment.robot_name)
-    chosen = [_shortened(d, quick) for name, d in known.items() if name in wanted]
+    chosen = [d for name, d in known.items() if name in wanted]
+    if quick:
+        chosen = [replace(d, levels=d.levels[:_QUICK_LEVELS], trials=_QUICK_TRIALS) for d in chosen]
     levels = {d.name: d.levels_for(gait.parameters) for d in chosen}
     stem = fingerprint(where.robot, [(d.name, d.levels, d.trials) for d in chosen], table)
     found = {
@@ -177,15 +179,12 @@ def measure(
         for d in chosen
     }
     for index in range(max(len(of) for of in levels.values())):
-        going = [d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken]
+        going = {
+            d.name: d for d in chosen if index < len(levels[d.name]) and not found[d.name].broken
+        }
         items: list[Item] = [
-            {
-                "experiment": table,
-                "disturbance": d.name,
-                "level": levels[d.name][index],
-                "number": i,
-            }
-            for d in going
+            {"experiment": table, "disturbance": name, "level": levels[name][index], "number": i}
+            for name, d in going.items()
             for i in range(d.trials)
         ]
         if not items:
@@ -200,10 +199,10 @@ def measure(
         for i, reason in done.failures.items():
             raise SweepError(f"trial {items[i]} came to no end: {reason}")
         results = iter(done.results)
-        for d in going:
+        for name, d in going.items():
             of_level = [next(results) for _ in range(d.trials)]
-            level = _judged(d, levels[d.name][index], of_level)
-            found[d.name] = replace(found[d.name], levels=(*found[d.name].levels, level))
+            level = _judged(d, levels[name][index], of_level)
+            found[name] = replace(found[name], levels=(*found[name].levels, level))
     errors = gait_errors(undisturbed, gait)
     findings = tuple(found[d.name] for d in chosen)
     return Robustness(where.robot.name, gait, *errors, findings, plant_name(where.world))
@@ -219,19 +218,9 @@ def _undisturbed(where: PreparedExperiment, robot: str) -> Record:
     return record
 
 
-def _shortened(disturbance: Disturbance, quick: bool) -> Disturbance:
-    if not quick:
-        return disturbance
-    return replace(disturbance, levels=disturbance.levels[:_QUICK_LEVELS], trials=_QUICK_TRIALS)
-
-
 def _judged(disturbance: Disturbance, level: float, results: list[dict[str, Any]]) -> Level:
-    """Count the trials of one level."""
+    """Count the trials of one level; what lasts may take a robot off its gait."""
     fell = sum(r["fell"] for r in results)
-    off_gait = sum(
-        not r["fell"] and max(abs(r["speed_error"]), abs(r["height_error"])) > SETTLED
-        for r in results
-    )
-    if not disturbance.passing:
-        off_gait = 0
+    errors = [(r["speed_error"], r["height_error"]) for r in results if not r["fell"]]
+    off_gait = disturbance.passing * sum(max(map(abs, pair)) > SETTLED for pair in errors)
     return Level(level, len(results) - fell - off_gait, fell, off_gait)

@@ -70,8 +70,7 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.warm_up import ready
 
-STEPS = 50
-"""Steps of a run on a route that does not end, where the experiment does not say."""
+STEPS = 50  # steps of a run on a route that does not end, where the experiment does not say
 
 _STAND = 2.0  # a walk's first and last stand [s]
 _LONGEST_DELAY = 1.0  # [s]

@@ -70,8 +70,7 @@ _LOG = logging.getLogger(__name__)
 QP_FAILURES = logging.getLogger(f"{__name__}.failures")
 """Logger of the warning that the QP has no solution in many ticks."""
 
-COMPILED = (*WALK, *RECORD, *DELAY)
-"""Compiled functions of a walk and its record."""
+COMPILED = (*WALK, *RECORD, *DELAY)  # compiled functions of a walk and its record
 
 _OTHER_TEMPLATE = 0.05
 """Share by which a template may differ from the robot's own: a choice of l0, not another robot."""

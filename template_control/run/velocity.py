@@ -44,8 +44,7 @@ _SLOWEST_ON_SOLES = 0.15
 """The same of a robot on flat feet, where the family's slow gaits begin, with other legs and steps
 a quarter shorter. On its way down to them G1 fell, as it turned or went sideways."""
 
-_SLOWEST_ON_PAIRS = 0.19
-"""The same of a quadruped. With slower walks Go2 fell as it turned."""
+_SLOWEST_ON_PAIRS = 0.19  # the same of a quadruped. With slower walks Go2 fell as it turned
 
 _FASTEST_ON_SOLES = 0.31
 """The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of

@@ -108,7 +108,7 @@ def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Ou
         try:
             return Outcome(to_jsonable(function(**arguments)), None)
         except (Exception, SystemExit) as error:
-            return Outcome(None, _reason(error))
+            return Outcome(None, f"{type(error).__name__}: {error}")
 
 
 @contextmanager
@@ -127,10 +127,6 @@ def _no_interrupt() -> Iterator[None]:
         signal.signal(signal.SIGINT, before)
 
 
-def _reason(error: BaseException) -> str:
-    return f"{type(error).__name__}: {error}"
-
-
 def _outcome(future: Future[Outcome]) -> Outcome:
     if future.cancelled():
         raise ExecutorLostError("it cancelled a call")
@@ -141,7 +137,7 @@ def _outcome(future: Future[Outcome]) -> Outcome:
         raise ExecutorLostError(str(error))
     if isinstance(error, KeyboardInterrupt):
         raise error
-    return Outcome(None, _reason(error))
+    return Outcome(None, f"{type(error).__name__}: {error}")
 
 
 class _Workers(ProcessPoolExecutor):

@@ -10,10 +10,8 @@ from collections.abc import Sequence
 from template_control.checks.ranges import Range
 from template_control.errors import ParameterError
 
-HOST = "127.0.0.1"
-"""Of all pages: they are for this machine only."""
-PORTS = Range(1, 65535)
-"""Of a server."""
+HOST = "127.0.0.1"  # of all pages: they are for this machine only
+PORTS = Range(1, 65535)  # of a server
 
 
 def show_in_browser(url: str) -> bool:

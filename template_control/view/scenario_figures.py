@@ -38,8 +38,7 @@ from template_control.view.style import (
 
 _LOOK = Look()
 _WHOLE = slice(None)
-ROUTE_FIGURES = ("scenario", "transitions")
-"""File names of a scenario's further figures."""
+ROUTE_FIGURES = ("scenario", "transitions")  # file names of a scenario's further figures
 _AROUND = 1.2  # [s] shown on either side of a transition
 
 

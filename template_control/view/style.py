@@ -68,8 +68,7 @@ def gallery(
     return figure, panels[:count]
 
 
-Curve = tuple[Array, dict[str, Any]]
-"""Values (T,), and how their line looks."""
+Curve = tuple[Array, dict[str, Any]]  # values (T,), and how their line looks
 AS_TEMPLATE: dict[str, Any] = {"color": TEMPLATE, "linestyle": "--", "linewidth": 1.0}
 """Look of the template's curve next to the robot's."""
 
@@ -164,8 +163,7 @@ class Look(Checked):
         return slice(first, after, 1 + (after - first) // _MOST_POINTS)
 
 
-Draw = Callable[[Any, Look], Figure]
-"""Figure of a run, of which it shows a part."""
+Draw = Callable[[Any, Look], Figure]  # figure of a run, of which it shows a part
 
 
 def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:

@@ -32,8 +32,7 @@ from template_control.view.live.server import PageServer
 from template_control.view.replay.playback import FRAME_RATES
 
 FPS = 30.0
-KEPT = 60.0
-"""End of a run that is kept for its record [s]."""
+KEPT = 60.0  # end of a run that is kept for its record [s]
 _DRAWN = 7  # frames between two plots
 _MANY_LATE = 0.5  # of the frames between two plots
 _PUSHED = 0.4  # [s] a push is shown: most last for three frames

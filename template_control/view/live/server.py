@@ -14,8 +14,7 @@ from urllib.parse import urlsplit
 from template_control.errors import MissingPackageError, ParameterError
 from template_control.view.browser import HOST, free_port
 
-PORTS = range(8080, 8180)
-"""Tried in turn where no port is asked for."""
+PORTS = range(8080, 8180)  # tried in turn where no port is asked for
 _ENDS = 10.0  # [s] that a server's thread may take to end
 # A browser opens connections ahead of use, and closes those that it does not need.
 _UNUSED = "opening handshake failed"

@@ -44,8 +44,7 @@ IN_SPACE = np.array(
     ]
 )
 """Camera of a floating-base run: from the right and from behind."""
-FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-"""Camera of a planar run."""
+FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # camera of a planar run
 
 
 class Stage:

@@ -15,15 +15,12 @@ from template_control.run.record import Record
 from template_control.view.style import interval
 
 _ZIGZAGS = 12
-CARRYING = 0.005
-"""Share of the weight that the plant counts as a contact."""
+CARRYING = 0.005  # share of the weight that the plant counts as a contact
 _STANCE = 0.03  # [s] a shorter contact is a scuff, no foothold
 _MOST_FRAMES = 100_000
 
-SPEEDS = Range(0.01, 100.0)
-"""Seconds of the run per second of its replay."""
-FRAME_RATES = Range(1.0, 120.0)
-"""Frames per second of a replay."""
+SPEEDS = Range(0.01, 100.0)  # seconds of the run per second of its replay
+FRAME_RATES = Range(1.0, 120.0)  # frames per second of a replay
 
 
 @dataclass(frozen=True)
