@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -56,6 +57,14 @@ def show(*tables: Table, lines: Iterable[str] = ()) -> None:
         console.print(shown)
     for line in lines:
         console.print(line, highlight=False)
+
+
+def report(as_json: bool, data: Any, *tables: Table, lines: Iterable[str] = ()) -> None:
+    """Print data as one JSON object, or :func:`show` tables and lines."""
+    if as_json:
+        print(json.dumps(data))
+    else:
+        show(*tables, lines=lines)
 
 
 def bar(console: Console, note: str = "", **options: Any) -> Progress:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset
 from template_control.storage import Files
-from template_control.terminal import show, table
+from template_control.terminal import report, table
 from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits, words
 from template_control.view.style import save_figure
 
@@ -48,10 +47,8 @@ def run(options: argparse.Namespace) -> int:
     if not options.no_figure:
         _check(options.output)
         figure = files.write(lambda: save(AUTOMATON, options.output))
-    if options.json:
-        print(json.dumps(describe(AUTOMATON)))
-    else:
-        show(*tables(AUTOMATON), lines=() if figure is None else (f"figure: {figure}",))
+    lines = () if figure is None else (f"figure: {figure}",)
+    report(options.json, describe(AUTOMATON), *tables(AUTOMATON), lines=lines)
     files.raise_pending()
     return 0
 

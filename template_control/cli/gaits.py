@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from rich.box import SIMPLE_HEAD
+from rich.table import Table
 
 from template_control import storage
 from template_control.arrays import Array
@@ -42,7 +43,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import Files, writing
-from template_control.terminal import show, table
+from template_control.terminal import report, table
 from template_control.view.stability_figures import UNITS, branch_figure, speed_family_figure
 from template_control.view.style import save_figure
 
@@ -189,10 +190,9 @@ def _branch(options: argparse.Namespace, folder: Path | None) -> int:
         figure = branch_figure(points, options.over, shown, bool(options.controlled))
         path = files.write(lambda: save_figure(figure, folder / "branch.png"))
         paths = [] if path is None else [path]
-    if options.json:
-        print(json.dumps({"points": [_data(p) for p in points], "figures": list(map(str, paths))}))
-    else:
-        _print(points, options.gait, options.over, paths)
+    data = {"points": [_data(p) for p in points], "figures": list(map(str, paths))}
+    found = _branch_table(points, options.gait, options.over)
+    report(options.json, data, found, lines=(f"figure: {path}" for path in paths))
     files.raise_pending()
     return 0
 
@@ -254,7 +254,7 @@ def _data(point: BranchPoint) -> dict[str, Any]:
     }
 
 
-def _print(points: list[BranchPoint], gait: str, over: str, paths: list[Path]) -> None:
+def _branch_table(points: list[BranchPoint], gait: str, over: str) -> Table:
     controlled = points[0].target is not None
     columns = [f"target {_COLUMNS[over]}"] if controlled else []
     columns += [_COLUMNS[name] for name in QUANTITIES]
@@ -270,7 +270,7 @@ def _print(points: list[BranchPoint], gait: str, over: str, paths: list[Path]) -
     title = f"branch of {gait} gaits, {len(points)} points"
     found = table(title, columns, rows, left=0, box=SIMPLE_HEAD)
     found.columns[-1].justify = "left"
-    show(found, lines=(f"figure: {path}" for path in paths))
+    return found
 
 
 def _number(name: str, value: float) -> str:
@@ -326,10 +326,8 @@ def make_family(folder: Path | None, as_json: bool) -> int:
             files.write(lambda: storage.write_text(folder / "walking.json", text)),
             files.write(lambda: save_figure(figure, folder / "by_speed.png")),
         ]
-    if as_json:
-        print(json.dumps(data))
-    else:
-        _print_family(chains, [path for path in paths if path is not None])
+    lines = (f"written: {path}" for path in paths if path is not None)
+    report(as_json, data, _family_table(chains), lines=lines)
     files.raise_pending()
     return 0
 
@@ -341,7 +339,7 @@ def _curves(chains: Chains, columns: tuple[Column, ...]) -> dict[str, list[Array
     }
 
 
-def _print_family(chains: Chains, paths: list[Path]) -> None:
+def _family_table(chains: Chains) -> Table:
     columns = [(how.rpartition(" "), of) for _, how, of in (*_SHOWN, *_EIGENVALUES) if how]
     rows, wanted = [], 0.0
     for member in (member for chain in chains for member in chain):
@@ -351,5 +349,4 @@ def _print_family(chains: Chains, paths: list[Path]) -> None:
             rows.append([format(of(*member), form) for (_, _, form), of in columns])
     title = "walking gaits by speed, for 80 kg and l0 = 1 m; largest eigenvalues"
     headers = [header for (header, _, _), _ in columns]
-    found = table(title, headers, rows, left=0, box=SIMPLE_HEAD)
-    show(found, lines=(f"written: {path}" for path in paths))
+    return table(title, headers, rows, left=0, box=SIMPLE_HEAD)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ from template_control.checks import option_types as values
 from template_control.embedding.robot_template import default_gait
 from template_control.robot.library import ROBOTS, SHIPPED, load_floating_robot, load_robot
 from template_control.slip.automaton.vocabulary import Slot
-from template_control.terminal import show, table
+from template_control.terminal import report, table
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -24,12 +23,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """List them."""
     rows = [_describe(name) for name in SHIPPED]
-    if options.json:
-        print(json.dumps(rows))
-        return 0
     columns = ("robot", "mass", "leg", "hip, knee limit", "l0", "k0", "default gait")
     lines = (f"- {row['robot']}: {row['about']}" for row in rows)
-    show(table("robots", columns, map(_row, rows)), lines=lines)
+    report(options.json, rows, table("robots", columns, map(_row, rows)), lines=lines)
     return 0
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
@@ -19,7 +18,7 @@ from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
 from template_control.storage import Files
-from template_control.terminal import figures_table, plain_console, show
+from template_control.terminal import figures_table, plain_console, report
 
 _MAPS = {kind.name.lower(): kind for kind in MapKind}
 
@@ -61,10 +60,8 @@ def run(options: argparse.Namespace) -> int:
         if not options.no_figures:
             files.write(lambda: view.save_scenario_figures(record, folder))
     figures = {**summarise_scenario(record), "record": None if path is None else str(path)}
-    if options.json:
-        print(json.dumps(figures))
-    else:
-        show(figures_table(f"{figures['scenario']}, {figures['map']} map", _rows(figures)))
+    title = f"{figures['scenario']}, {figures['map']} map"
+    report(options.json, figures, figures_table(title, _rows(figures)))
     files.raise_pending()
     return 0 if record.completed else 1
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 
@@ -11,7 +10,7 @@ from template_control.checks import option_types as values
 from template_control.errors import ParameterError
 from template_control.paper.reproduction import LONG, REPRODUCTIONS, Reproduction
 from template_control.storage import Files, writing
-from template_control.terminal import plain_console, show, table
+from template_control.terminal import plain_console, report, table
 from template_control.view.style import save_figure
 
 
@@ -42,11 +41,9 @@ def run(options: argparse.Namespace) -> int:
             result = REPRODUCTIONS[options.name]()
         if folder is not None:
             paths = files.write(lambda: _save(result, folder)) or []
-    if options.json:
-        print(json.dumps({"name": options.name, **result.data, "figures": [str(p) for p in paths]}))
-    else:
-        lines = [*(f"- {note}" for note in result.notes), *(f"figure: {path}" for path in paths)]
-        show(table(result.title, result.columns, result.rows), lines=lines)
+    data = {"name": options.name, **result.data, "figures": [str(p) for p in paths]}
+    lines = [*(f"- {note}" for note in result.notes), *(f"figure: {path}" for path in paths)]
+    report(options.json, data, table(result.title, result.columns, result.rows), lines=lines)
     files.raise_pending()
     return 0
 
