@@ -16,11 +16,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Compile what is not yet; returns 0.
-
-    Args:
-        options: of the command line, none.
-    """
+    """Compile what is not yet; returns 0."""
     from template_control.compiled import cache_folder
     from template_control.embedding.planners.ahead import AHEAD
     from template_control.embedding.planners.walk_kernels import WALK

@@ -132,11 +132,7 @@ class DelayCompensation:
         return self._robot.moved(q, step), v + dt * pending.sum(axis=0)
 
     def expect(self, acceleration: Array) -> None:
-        """Store the acceleration that this tick's torques should cause.
-
-        Args:
-            acceleration: (nv,) while they act [m/s^2, rad/s^2].
-        """
+        """Store the acceleration (nv,) that this tick's torques should cause [m/s^2, rad/s^2]."""
         if self._most:
             self._expected[self._tick - self._first + self._most + 1] = acceleration
             self._tick += 1

@@ -127,11 +127,7 @@ class DisturbanceDistribution(Checked):
         return self.within[1] + self.after
 
     def draw(self, seed: Index) -> DisturbanceSample:
-        """The numbers of one trial.
-
-        Args:
-            seed: of the draw.
-        """
+        """The numbers of one trial, drawn with a ``seed``."""
         lot = np.random.default_rng(seed)
         drawn = {name: float(lot.uniform(*getattr(self, name))) for name in _DRAWN}
         at = lot.uniform(*self.within, 2)
@@ -219,11 +215,7 @@ class CampaignConfig(Checked):
             )
 
     def draw(self, number: Index) -> DisturbanceSample:
-        """Disturbances of a trial.
-
-        Args:
-            number: of the trial, from 0.
-        """
+        """Disturbances of the trial with a ``number`` from 0."""
         return self.mix.draw(item_seed(self.seed, number))
 
     def trial(self, number: Index) -> tuple[Experiment, PreparedExperiment]:
@@ -326,11 +318,7 @@ class Campaign:
         return dict(Counter(t.first for t in self.fell).most_common())
 
     def interval(self, of: Sequence[Trial]) -> tuple[float, float]:
-        """Wilson's 95 % interval of the share of some of the trials.
-
-        Args:
-            of: those trials.
-        """
+        """Wilson's 95 % interval of the share ``of`` some of the trials."""
         return wilson_interval(len(of), len(self.trials))
 
 

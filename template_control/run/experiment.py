@@ -365,11 +365,7 @@ class PreparedExperiment(Experiment):
         return self
 
     def heading(self, time: float) -> Course:
-        """Where a floating-base robot is to go at a time.
-
-        Args:
-            time: from the run's start [s].
-        """
+        """Where a floating-base robot is to go at a ``time`` from the run's start [s]."""
         if self.velocity is None:
             return Course(self.course.side_speed, self.course.rate(time))
         return course_at(self.velocity, time, self.robot)

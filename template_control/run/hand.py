@@ -109,11 +109,7 @@ class Hand:
         self.idle = False
 
     def act(self, now: float) -> None:
-        """Do what is due at a tick, before it.
-
-        Args:
-            now: time since the run's start [s].
-        """
+        """Do what is due before the tick at a time ``now`` from the run's start [s]."""
         while self._slippery and self._slippery[0][0] <= now:
             self._change_friction(self._slippery.popleft()[1])
         while self._asked:

@@ -180,11 +180,7 @@ class LiveRun:
         self.close()
 
     def finish(self, progress: Callable[[int], None] | None = None) -> None:
-        """Go on to the end.
-
-        Args:
-            progress: called with the number of completed steps after each.
-        """
+        """Go on to the end; ``progress`` gets the number of completed steps after each."""
         done = 0
         for tick in self:
             if tick.steps > done:

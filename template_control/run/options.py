@@ -46,8 +46,7 @@ class Push(Checked):
     def begins(self, begun: Sequence[tuple[float, float]]) -> float | None:
         """Time of the push from the run's start [s]; None where its step has not begun.
 
-        Args:
-            begun: when each step began, and the duration of its gait's steps [s].
+        ``begun`` has when each step began, and the duration of its gait's steps [s].
         """
         if self.time is not None:
             return self.time
@@ -119,9 +118,5 @@ class HeadingCommand(Checked):
             raise ParameterError(f"HeadingCommand.turns has the times {times}: give rising ones")
 
     def rate(self, time: float) -> float:
-        """Turning rate at a time [rad/s].
-
-        Args:
-            time: from the run's start [s].
-        """
+        """Turning rate at a ``time`` [s] from the run's start [rad/s]."""
         return next((rate for at, rate in reversed(self.turns) if time >= at), self.turning_rate)

@@ -139,11 +139,7 @@ class Record(Facts):
         return len(self.section_time) - 1
 
     def in_phase(self, phase: Phase) -> BoolArray:
-        """(T,) whether the controller was in a phase.
-
-        Args:
-            phase: such as ``Phase.SS``.
-        """
+        """(T,) whether the controller was in a ``phase``, such as ``Phase.SS``."""
         return np.array([other is phase for other in self.phases])[self.node]
 
     @property
@@ -152,12 +148,9 @@ class Record(Facts):
         return [self.strides[i] for i in self.stride]
 
     def of_legs(self, values: Array) -> Array:
-        """(T, 2, ...) means of what each contact has, over the contacts of each template leg.
+        """(T, 2, ...) means of ``values`` (T, n, ...), such as ``foot``, over each leg's contacts.
 
         NaN of a leg without any.
-
-        Args:
-            values: (T, n, ...) such as ``foot``.
         """
         return leg_means(values, self.groups, axis=1)
 

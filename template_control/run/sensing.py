@@ -57,11 +57,7 @@ class SensorOptions(Checked):
             )
 
     def deviations(self, scale: Scale) -> tuple[float, float]:
-        """Standard deviations of angles [rad] and of their velocities [rad/s].
-
-        Args:
-            scale: of the robot's template.
-        """
+        """Standard deviations of angles [rad] and velocities [rad/s] at a template's ``scale``."""
         if self.noise:
             return self.noise, _VELOCITY_NOISE / scale.time * self.noise
         return self.position_noise, self.velocity_noise

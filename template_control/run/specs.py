@@ -99,11 +99,7 @@ class GaitSpec(Checked):
         return default_gait(robot, angle)
 
     def run_speed(self, robot: Biped) -> float:
-        """Of a run, dx/dt at apex [m/s].
-
-        Args:
-            robot: its last update is overwritten.
-        """
+        """Of a run of a ``robot``, dx/dt at apex [m/s]; the robot's last update is overwritten."""
         if self.speed is not None:
             return self.speed
         return (SOLE_RUN if robot.patches else _RUN) * template_for(robot).speed_unit

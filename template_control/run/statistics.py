@@ -74,11 +74,7 @@ class Statistics:
 
     @classmethod
     def read(cls, table: Mapping[str, Any]) -> Self:
-        """Statistics as a run's metadata have them.
-
-        Args:
-            table: of plain data.
-        """
+        """Statistics as a run's metadata have them, a ``table`` of plain data."""
         kinds = (("joint_torque", JointTorque), ("joint_speed", JointSpeed))
         joints = {
             key: {name: kind(**row) for name, row in table[key].items()}

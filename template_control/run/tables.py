@@ -96,15 +96,11 @@ def _values(record: Any, name: str) -> NDArray[Any]:
 
 
 def columns(record: Any) -> dict[str, Column]:
-    """Every quantity that a run has at each sample, by name.
+    """Every quantity that a run, a :class:`~.record.Record`, has at each sample, by name.
 
-    A name is the field of :class:`~.record.Record`, then what its axes stand for:
-    ``q_pitch``, ``torque_left_knee``, ``foot_right_foot_y``. ``node`` and ``rear`` hold the names
-    of the automaton's node and of the rear stance foot.
-
-    Args:
-        record: the run, a :class:`~.record.Record`; that class imports this function, so it
-            cannot be named as the type here.
+    A name is the field of that class, then what its axes stand for: ``q_pitch``,
+    ``torque_left_knee``, ``foot_right_foot_y``. ``node`` and ``rear`` hold the names of the
+    automaton's node and of the rear stance foot.
     """
     labels, found = _labels(record), {}
     for name, quantity in quantities(type(record)).items():

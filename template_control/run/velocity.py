@@ -105,11 +105,7 @@ class VelocityProfile(Checked):
             )
 
     def at(self, time: float) -> Velocity:
-        """The velocity wanted at a time.
-
-        Args:
-            time: from the run's start [s].
-        """
+        """The velocity wanted at a ``time`` from the run's start [s]."""
         return next(row[1:] for row in reversed(self.velocities) if time >= row[0])
 
 
@@ -191,11 +187,7 @@ class VelocityRange:
 
     @classmethod
     def of(cls, robot: Biped) -> VelocityRange:
-        """The velocities of a robot, to a centimetre per second.
-
-        Args:
-            robot: its last update is overwritten.
-        """
+        """The velocities of a ``robot``, to a centimetre per second; its update is overwritten."""
         p = template_for(robot)
         try:
             low, high = walking_speeds(robot)

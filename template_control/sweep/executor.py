@@ -153,13 +153,10 @@ def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
 
 @contextmanager
 def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
-    """Worker processes of this machine for the time of a ``with`` block.
+    """Worker processes for the time of a ``with`` block, one a core or ``count``.
 
     They leave Ctrl-C to this process, and end with it however it ends. An error in the block,
     Ctrl-C for one, kills them whatever they are doing.
-
-    Args:
-        count: how many; None for one a core.
     """
     others = set(multiprocessing.active_children())
     pool = _Workers(count, initializer=_obey_parent_only)

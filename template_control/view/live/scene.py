@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import cos, sin
+from math import atan2, cos, sin
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,15 @@ from template_control.robot.biped import leg_means
 from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import CARRYING, force_arrows, spring
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals
-from template_control.view.replay.scene import plates, points, raised, smoothed, strip, turned_to
+from template_control.view.replay.scene import (
+    plates,
+    points,
+    raised,
+    smoothed,
+    strip,
+    stripes,
+    turned_to,
+)
 from template_control.view.style import COM, TEMPLATE, feet_shown
 
 _GROUND, _LINES, _PUSH = "#dde1e6", "#b4bac2", "#c22f3d"
@@ -38,7 +46,6 @@ _FOOTHOLDS = 6  # of each foot
 _PLANAR_EYE, _FLOATING_EYE, _VIEW = (1.6, -9.0, 1.0), (4.5, -7.5, 2.6), 0.24
 _MIDDLE = 0.62  # of l0: height of the middle of the picture, at the least
 _SHOWN = 0.53  # of the robot's height: size of a picture that has 0.07 of it to spare
-_NONE = np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -247,8 +254,12 @@ class LiveScene:
         for arrow, foot, force, stands in feet:
             arrow.reach(foot, force, stands)
         self._draw_push(frame, push)
-        for i in np.flatnonzero(frame.stands & ~self._stood).tolist():
-            self._mark(i, frame.foot[i])
+        for foot in np.flatnonzero(frame.stands & ~self._stood).tolist():
+            marks, place = self._holds[foot], frame.foot[foot]
+            marks.rotate(-1)  # its oldest mark goes where it has come down
+            height = self._terrain.height_at(float(place[0])) + 0.002 * self._length
+            marks[-1].position = (float(place[0]), float(place[1]), height)
+            marks[-1].visible = True
         self._stood = frame.stands
         self._frames += 1
         if self._frames % _TRAILED == 0:
@@ -266,27 +277,15 @@ class LiveScene:
         self._stood[:] = False
 
     def _draw_push(self, frame: Frame, push: tuple[float, float]) -> None:
-        along, left = push
-        c, s = cos(frame.heading), sin(frame.heading)
-        force = np.array([c * along - s * left, s * along + c * left, 0.0])
-        shown = bool(force.any())
-        span = force / np.linalg.norm(force) * 0.5 * self._length if shown else _NONE
-        self._push.reach(frame.com - span, span, shown)
-
-    def _mark(self, foot: int, place: Array) -> None:
-        """A foot has come down: its oldest mark goes there."""
-        marks = self._holds[foot]
-        marks.rotate(-1)
-        x, y, _ = place.tolist()
-        marks[-1].position = (x, y, self._terrain.height_at(x) + 0.002 * self._length)
-        marks[-1].visible = True
+        size = float(np.hypot(*push))
+        turn = frame.heading + atan2(push[1], push[0])
+        span = 0.5 * self._length * np.array([cos(turn), sin(turn), 0.0])
+        self._push.reach(frame.com - span, span, size > 0.0)
 
     def _renew_ground(self, x: float, y: float) -> None:
         """Draw the ground around a place [m], where the one that is drawn is too far away."""
-        length = self._length
-        if self._place is not None and np.hypot(x - self._place[0], y - self._place[1]) < (
-            _RENEWED * length
-        ):
+        length, place = self._length, self._place
+        if place and np.hypot(x - place[0], y - place[1]) < _RENEWED * length:
             return
         self._place = x, y
         line = np.array(self._terrain.line(x - _SEEN * length, x + _SEEN * length))
@@ -294,13 +293,8 @@ class LiveScene:
         how = {"side": "double", "cast_shadow": False}
         surface = strip(line, (y - wide, y + wide))
         self._scene.add_mesh_simple("/world/ground", *surface, color=_rgb(_GROUND), **how)
-        # A line every rest length shows that the camera travels.
-        first, last = np.ceil(line[[0, -1], 0] / length)
-        lines = np.arange(first, last) * length
-        heights = [self._terrain.height_at(place) for place in lines.tolist()]
-        centres = np.stack((lines, y + 0.0 * lines, np.array(heights) + 1e-3 * length), axis=-1)
-        stripes = plates(centres, (0.012 * length, 2.0 * wide))
-        self._scene.add_mesh_simple("/world/stripes", *stripes, color=_rgb(_LINES), **how)
+        lines = stripes(self._terrain, (line[0, 0], line[-1, 0]), (y, 2.0 * wide), length)
+        self._scene.add_mesh_simple("/world/stripes", *lines, color=_rgb(_LINES), **how)
 
 
 def _spread(record: Record) -> float:

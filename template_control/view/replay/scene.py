@@ -66,6 +66,19 @@ def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, IntArray]:
     return np.concatenate(edges), np.concatenate((near, far))
 
 
+def stripes(
+    ground: Terrain, ends: tuple[float, float], side: tuple[float, float], length: float
+) -> tuple[Array, IntArray]:
+    """A line across the ground every rest ``length``, which shows that the camera travels.
+
+    ``ends`` are along x, ``side`` is the middle along y and the lines' length [m].
+    """
+    x = np.arange(np.ceil(ends[0] / length), ends[1] / length) * length
+    heights = np.array([ground.height_at(place) for place in x.tolist()])
+    centres = np.stack((x, side[0] + 0.0 * x, heights + 0.001 * length), axis=-1)
+    return plates(centres, (0.012 * length, side[1]))
+
+
 def smoothed(ground: Terrain, x: Array, length: float) -> Array:
     """Mean height of the ground over ``length`` [m] around places x (N,), for a camera."""
     around = np.linspace(-0.5, 0.5, _AROUND) * length
@@ -264,20 +277,16 @@ def _overlay(color: str) -> mg.Material:
 
 def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
     """Two crossed strips along (N, 3) points; four blocks of N vertices."""
-    vertices, faces = [], []
     steps = np.diff(points, axis=0, append=points[-1:])
     steps[-1] = points[-1] - points[-2]
     in_plane = np.stack((-steps[:, 2], 0.0 * steps[:, 1], steps[:, 0]), axis=-1)
     in_plane /= np.maximum(np.linalg.norm(in_plane, axis=1, keepdims=True), 1e-12)
     across = np.broadcast_to([0.0, 1.0, 0.0], points.shape)
-    for side in (in_plane, across):
-        vertices += [points + 0.5 * width * side, points - 0.5 * width * side]
-    count = len(points)
-    for i in range(count - 1):
-        for strip in (0, 2 * count):
-            a, b = strip + i, strip + count + i
-            faces += [(a, b, a + 1), (b, b + 1, a + 1)]
-    return mg.TriangularMeshGeometry(np.concatenate(vertices), np.array(faces))
+    sides = (0.5 * width * side for side in (in_plane, -in_plane, across, -across))
+    vertices, count = np.concatenate([points + side for side in sides]), len(points)
+    a = np.arange(count - 1)[:, None] + np.array([0, 2 * count])  # each step of both strips
+    faces = np.stack((a, a + count, a + 1, a + count, a + count + 1, a + 1), axis=-1)
+    return mg.TriangularMeshGeometry(vertices, faces.reshape(-1, 3))
 
 
 def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
@@ -288,21 +297,14 @@ def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float
         scene.set(path, "visible", False)
     x, y = space.com[rows, :2].T
     sides = float(y.min()) - 1.5 * length, float(y.max()) + 1.5 * length
-    middle, width = 0.5 * (sides[0] + sides[1]), sides[1] - sides[0]
-    low, high = float(x.min()) - 6.0 * length, float(x.max()) + 6.0 * length
-    ground = record.ground
-    shape, place = ground_shape(np.array(ground.line(low, high)), sides, length)
+    ends = float(x.min()) - 6.0 * length, float(x.max()) + 6.0 * length
+    shape, place = ground_shape(np.array(record.ground.line(*ends)), sides, length)
     scene.add("/meshcat/ground", shape, mg.MeshBasicMaterial(color=0xDDE1E6, side="DoubleSide"))
     scene.place("/meshcat/ground", place)
-    # A line every rest length shows that the camera travels.
-    lines = np.arange(np.ceil(low / length), high / length) * length
-    heights = np.array([ground.height_at(place) for place in lines.tolist()])
-    centres = np.stack((lines, middle + 0.0 * lines, heights + 0.001 * length), axis=-1)
-    stripes = plates(centres, (0.012 * length, width))
+    lines = stripes(record.ground, ends, (0.5 * (sides[0] + sides[1]), sides[1] - sides[0]), length)
     material = mg.MeshBasicMaterial(color=0xB4BAC2)
-    scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*stripes), material)
-    level = smoothed(ground, x, length)
-    travel = np.stack((x, y, level + 0.72 * length), axis=-1)
+    scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*lines), material)
+    travel = np.stack((x, y, smoothed(record.ground, x, length) + 0.72 * length), axis=-1)
     scene.animate("/meshcat", "position", "vector3", -travel)
     # From afar with a narrow view: little perspective, so that lengths can be compared.
     eye = [0.7 * length, 0.45 * length, 4.0 * length]
@@ -351,21 +353,15 @@ def _template(scene: _Scene, playback: Playback, space: Space, length: float) ->
 
 def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
-    on = carrying(record)
-    shaft, head = np.eye(4), np.eye(4)
-    upright = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    shaft[:3, :3] = head[:3, :3] = upright
-    shaft[2, 3], head[2, 3] = 0.425, 0.925
+    on, radius = carrying(record), 0.013 * length
+    cone = mg.Cylinder(0.15, radiusTop=0.0, radiusBottom=3.0 * radius)
+    parts = ("shaft", mg.Cylinder(0.85, radius), 0.425), ("head", cone, 0.925)
     for foot, (name, color) in enumerate(feet_shown(record)):
         path = f"/meshcat/ground_force/{name.removesuffix(' foot')}"
-        radius = 0.013 * length
-        cone = mg.Cylinder(0.15, radiusTop=0.0, radiusBottom=3.0 * radius)
-        for part, geometry, offset in (
-            ("shaft", mg.Cylinder(0.85, radius), shaft),
-            ("head", cone, head),
-        ):
+        for part, geometry, height in parts:
+            upright = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, height], [0, 0, 0, 1]])
             scene.add(f"{path}/{part}", geometry, _overlay(color))
-            scene.place(f"{path}/{part}", offset)
+            scene.place(f"{path}/{part}", upright)
         scene.stretch(path, space.foot[rows, foot], space.arrow[rows, foot], on[rows, foot])
 
 
