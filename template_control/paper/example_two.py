@@ -33,7 +33,7 @@ from template_control.slip.maps.section import VLO
 from template_control.sweep.executor import workers
 from template_control.terminal import counted
 from template_control.view.figures import stick_diagram
-from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, Look, shade
+from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, Look, panelled, shade
 
 _COLORS = (TEMPLATE, RIGHT, LEFT, COM)
 
@@ -136,8 +136,7 @@ def states_figure(
 
 def liftoff_figure(settled: Record, records: dict[str, Record]) -> Figure:
     """CoM in a step of a settled walk, and torques of a first step with each liftoff rule."""
-    figure = Figure(figsize=(9.0, 2.2 * (len(records) + 1)), layout="constrained")
-    panels = figure.subplots(len(records) + 1, 1)
+    figure, panels = panelled(2.2 * (len(records) + 1), len(records) + 1)
     begin, _, end = _step(settled, len(settled.section_time) - 3)
     w = slice(begin, end)
     com, template = settled.com[w], settled.template_com[w]
@@ -145,16 +144,13 @@ def liftoff_figure(settled: Record, records: dict[str, Record]) -> Figure:
     panels[0].plot(*template.T, color=TEMPLATE, linestyle="--", linewidth=1.0, label="template")
     panels[0].set(xlabel="CoM x [m]", ylabel="CoM y [m]", title="(a) settled walk")
     panels[0].legend(loc="upper left", frameon=False)
-    names = ("lifting hip", "lifting knee", "standing hip", "standing knee")
     for axes, (rule, record), letter in zip(panels[1:], records.items(), "bcdef", strict=False):
         begin, lifted, end = _step(record)
         w = slice(begin, end)
-        for joint, name, color in zip(
-            _joints(record, lifted), names, (LEFT, COM, RIGHT, TRUNK), strict=True
-        ):
-            axes.plot(
-                record.time[w], record.torque[w, joint], color=color, linewidth=1.2, label=name
-            )
+        joints = zip(_joints(record, lifted), _JOINTS, (LEFT, COM, RIGHT, TRUNK), strict=True)
+        for joint, name, color in joints:
+            values = record.torque[w, joint]
+            axes.plot(record.time[w], values, color=color, linewidth=1.2, label=name)
         shade(axes, record, w)
         axes.set(ylabel="torque [N m]", ylim=(-360, 360), title=f"({letter}) liftoff: {rule}")
     panels[1].legend(loc="upper right", ncols=4, frameon=False, fontsize=8)
@@ -263,13 +259,9 @@ def _texts(walk: Walk) -> tuple[str, ...]:
     settled = walk.settled
     if settled is None:
         return "", "", "", f"step {len(walk.states)}"
-    mean, spread = settled
-    return (
-        f"{mean[0]:.4f} ± {spread[0]:.4f}",
-        f"{np.degrees(mean[1]):+.2f} ± {np.degrees(spread[1]):.2f}",
-        f"{mean[2]:.2f} ± {spread[2]:.2f}",
-        "",
-    )
+    (y, phi, energy), (dy, dphi, de) = settled
+    angle = f"{np.degrees(phi):+.2f} ± {np.degrees(dphi):.2f}"
+    return f"{y:.4f} ± {dy:.4f}", angle, f"{energy:.2f} ± {de:.2f}", ""
 
 
 def _numbers(walk: Walk) -> dict[str, Any]:
@@ -363,19 +355,16 @@ def fig13(steps: int = _LIFTOFF_STEPS) -> Reproduction:
     with workers() as pool:
         done = counted(pool.map(partial(_liftoffs, steps=steps), cases), len(cases), "walks")
         results = dict(zip(cases, done, strict=True))
-    rows: list[tuple[str, ...]] = []
-    for (rule, plant), (event, _, walk, _) in results.items():
-        rows.append(
-            (
-                rule,
-                plant,
-                f"{np.degrees(event.beta):.1f}",
-                f"{event.load:.0f}",
-                "  ".join(f"{x:.0f}" for x in event.jump),
-                "  ".join(f"{x:.0f}" for x in event.peak),
-                f"{steps} steps" if not walk.fall else f"falls in step {len(walk.states)}",
-            )
+    rows = [
+        (
+            *case,
+            f"{np.degrees(event.beta):.1f}",
+            f"{event.load:.0f}",
+            *("  ".join(f"{x:.0f}" for x in of) for of in (event.jump, event.peak)),
+            f"falls in step {len(walk.states)}" if walk.fall else f"{steps} steps",
         )
+        for case, (event, _, walk, _) in results.items()
+    ]
     return Reproduction(
         title="Fig. 13: torques about liftoff, one step from the equilibrium",
         columns=(

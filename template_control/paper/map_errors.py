@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -15,6 +16,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outco
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.view.style import panelled
 
 
 @dataclass(frozen=True)
@@ -59,12 +61,9 @@ class MapErrors:
 
     def statistics(self) -> dict[str, dict[str, float]]:
         """Mean, sd and max of both, as in Table III."""
+        of: dict[str, Any] = {"mean": np.nanmean, "sd": np.nanstd, "max": np.nanmax}
         return {
-            name: {
-                "mean": float(np.nanmean(e)),
-                "sd": float(np.nanstd(e)),
-                "max": float(np.nanmax(e)),
-            }
+            name: {statistic: float(f(e)) for statistic, f in of.items()}
             for name, e in (("position", self.position), ("velocity", self.velocity))
         }
 
@@ -118,13 +117,10 @@ _COLORS = ("#db7321", "#2a6196", "#6b7078", "#3a9a4a")
 
 def error_figure(edges: Array, counts: Array, means: Mapping[str, tuple[Array, Array]]) -> Figure:
     """Mean errors [%] by map (b,), binned over d_v with edges (b + 1,), and the runs' counts."""
-    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    figure, panels = panelled(3.6, 1, 2)
     centres, width = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
-    for panel, (axes, label) in enumerate(
-        zip(
-            figure.subplots(1, 2), ("position error e_v [%]", "velocity error E_v [%]"), strict=True
-        )
-    ):
+    labels = ("position error e_v [%]", "velocity error E_v [%]")
+    for panel, (axes, label) in enumerate(zip(panels, labels, strict=True)):
         bars = axes.twinx()
         bars.bar(centres, counts, width=0.9 * width, color="0.88", zorder=0)
         bars.set_ylabel("runs")
@@ -144,8 +140,7 @@ def stride_figure(
     title: str,
 ) -> Figure:
     """A stride's CoM paths (n, 2), its legs (toe, CoM), and its events with x and y [m]."""
-    figure = Figure(figsize=(9.0, 4.0), layout="constrained")
-    axes = figure.subplots()
+    figure, (axes,) = panelled(4.0)
     for toe, com in legs:
         axes.plot([toe[0], com[0]], [toe[1], com[1]], color="0.75", linewidth=1.0, zorder=1)
     for color, (label, path) in zip(_COLORS, paths, strict=False):
@@ -237,12 +232,7 @@ def fig5() -> Reproduction:
     ]
     return Reproduction(
         title="Fig. 5: error against the distance d_v between two returns",
-        columns=(
-            "d_v",
-            "runs",
-            *(f"e_v {name} [%]" for name in means),
-            *(f"E_v {name} [%]" for name in means),
-        ),
+        columns=("d_v", "runs", *(f"{e}_v {name} [%]" for e in "eE" for name in means)),
         rows=rows,
         data={
             "grid": asdict(grid),

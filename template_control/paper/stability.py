@@ -189,9 +189,10 @@ def basin_slice(energy: float) -> tuple[IntArray, BoolArray]:
 def fig8(energies: Array = _ENERGIES) -> Reproduction:
     """The self-stable basin of the equilibria at 0.9818 m, in slices at ``energies`` (n,) [J]."""
     points = branch()
-    fold = next(p for p in points if p.special is Special.FOLD)
-    lost = next(p for p in points if p.special is Special.SADDLE_NODE)
-    torus = next(p for p in points if p.special is Special.NEIMARK_SACKER)
+    fold, lost, torus = (
+        next(p for p in points if p.special is special)
+        for special in (Special.FOLD, Special.SADDLE_NODE, Special.NEIMARK_SACKER)
+    )
     low = lower_limit()
     with workers() as pool:
         results = pool.map(basin_slice, energies)
@@ -251,28 +252,18 @@ def fig9(counts: tuple[int, int] = (100, 400)) -> Reproduction:
         settled[name] = settles(controlled_end(found, gait, kind), stable, gait)
         shares[name], full[name] = inside_share(found, settled[name], np.radians(_LEAST_ANGLES))
     at = int(np.argmin(np.abs(_LEAST_ANGLES - PUBLISHED_ANGLE)))
-
-    def row(name: str, published: str, values: list[str]) -> tuple[str, ...]:
-        return (name, published, *values)
-
-    rows = [
-        row("Pz_in, whole set", "", [f"{100 * v[0]:.1f} %" for v in shares.values()]),
-        row(
-            f"Pz_in at alpha_min {PUBLISHED_ANGLE:g} deg",
+    angle = f"{PUBLISHED_ANGLE:g} deg"
+    name, most = f"Pz_in at alpha_min {angle}", "alpha_min from which Pz_in"
+    rows: list[tuple[str, ...]] = [
+        ("Pz_in, whole set", "", *(f"{100 * v[0]:.1f} %" for v in shares.values())),
+        (
+            f"Pz_in at alpha_min {angle}",
             "100 %",
-            [f"{100 * v[at]:.2f} %" for v in shares.values()],
+            *(f"{100 * v[at]:.2f} %" for v in shares.values()),
         ),
-        row(
-            "alpha_min from which Pz_in >= 99.9 %",
-            "",
-            [f"{_least(v, 0.999):.1f} deg" for v in shares.values()],
-        ),
-        row(
-            "alpha_min from which Pz_in = 100 %",
-            f"{PUBLISHED_ANGLE:g} deg",
-            [f"{np.degrees(v):.2f} deg" for v in full.values()],
-        ),
-        row("states that fail", "", [f"{int(np.sum(~v))}" for v in settled.values()]),
+        (f"{most} >= 99.9 %", "", *(f"{_least(v, 0.999):.1f} deg" for v in shares.values())),
+        (f"{most} = 100 %", angle, *(f"{np.degrees(v):.2f} deg" for v in full.values())),
+        ("states that fail", "", *(f"{int(np.sum(~v))}" for v in settled.values())),
     ]
     phi = np.degrees(velocity_angle(found.state))
     return Reproduction(

@@ -12,7 +12,7 @@ from template_control.paper.reproduction import Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.control.controllers import RunToWalk, StepSolution, WalkToRun
-from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
+from template_control.slip.dynamics.stride import FiredEvent, Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
@@ -116,94 +116,72 @@ def _solution(solution: StepSolution, end: list[float]) -> dict[str, Any]:
 
 def _drawn(strides: list[tuple[str, Stride]], title: str) -> Any:
     main = strides[0][1]
-    toes = np.zeros(2)
     legs: list[tuple[Array, Array]] = []
     for t in np.linspace(0.0, main.duration, 25):
-        row = int(main.rows(t))
-        com = main.sample(t)[0, :2]
-        toes = main.meta[row, 3:5]
-        for leg in range(2):
-            if main.meta[row, 5 + leg] > 0.0:
-                legs.append((np.array([toes[leg], 0.0]), com))
+        meta, com = main.meta[int(main.rows(t))], main.sample(t)[0, :2]
+        legs += [(np.array([meta[3 + i], 0.0]), com) for i in range(2) if meta[5 + i] > 0.0]
     paths = [(name, s.sample(np.linspace(0.0, s.duration, 200))[:, :2]) for name, s in strides]
-    events = [
-        (_EVENTS.get(e.event.name, e.event.name), float(e.state[0]), float(e.state[1]))
-        for e in main.events
-    ]
+    events = [(_name(e), float(e.state[0]), float(e.state[1])) for e in main.events]
     return stride_figure(paths, legs, events, title)
-
-
-def _event_rows(stride: Stride) -> list[tuple[str, ...]]:
-    return [
-        (
-            e.source,
-            _EVENTS.get(e.event.name, e.event.name),
-            f"{e.time:.4f}",
-            *(f"{value:.4f}" for value in e.state),
-        )
-        for e in stride.events
-    ]
 
 
 _EVENT_COLUMNS = ("node left", "event", "t [s]", "x [m]", "y [m]", "dx/dt [m/s]", "dy/dt [m/s]")
 
 
-def _stride_data(strides: list[tuple[str, Stride]]) -> dict[str, Any]:
-    return {
-        name: {
-            "outcome": s.outcome.reason,
-            "end": s.state.tolist(),
-            "duration": s.duration,
-            "events": [
-                {"event": e.event.name, "node": e.source, "time": e.time, "state": e.state.tolist()}
-                for e in s.events
-            ],
-        }
-        for name, s in strides
-    }
+def _stride(name: str, u: Array) -> Stride:
+    """A stride of Table IV on the exact model."""
+    kind, start, _ = _STRIDES[name]
+    section = VLO if name == "WRT" else APEX
+    return simulate_stride(P, STRIDE_START[kind], section.state(start), u)
+
+
+def _name(event: FiredEvent) -> str:
+    return _EVENTS.get(event.event.name, event.event.name)
+
+
+def _compared(figure: str, words: str, published: Stride, ours: Stride, note: str) -> Reproduction:
+    """A stride with Table IV's gains, and with ours."""
+    strides = [("Table IV's gains", published), ("improved map", ours)]
+
+    def event(e: FiredEvent) -> dict[str, Any]:
+        return {"event": e.event.name, "node": e.source, "time": e.time, "state": e.state.tolist()}
+
+    return Reproduction(
+        title=f"Fig. {figure[3:]}: {words.replace(' ', '-')} stride with Table IV's gains",
+        columns=_EVENT_COLUMNS,
+        rows=[
+            (e.source, _name(e), f"{e.time:.4f}", *(f"{value:.4f}" for value in e.state))
+            for e in published.events
+        ],
+        data={
+            by: {
+                "outcome": s.outcome.reason,
+                "end": s.state.tolist(),
+                "duration": s.duration,
+                "events": list(map(event, s.events)),
+            }
+            for by, s in strides
+        },
+        notes=(note,),
+        figures={figure: _drawn(strides, words)},
+    )
 
 
 def fig6() -> Reproduction:
     """Fig. 6: the WRT stride on the exact model, with Table IV's gains and with ours."""
-    start = VLO.state(WRT_STATE)
-    published = simulate_stride(P, STRIDE_START[StrideKind.WALK_TO_RUN], start, WRT_CONTROLS)
+    published = _stride("WRT", WRT_CONTROLS)
     target = np.array([published.state[2], APEX_HEIGHT])
-    ours = walk_to_run(target)[MapKind.IMPROVED].controls
-    strides = [
-        ("Table IV's gains", published),
-        ("improved map", simulate_stride(P, STRIDE_START[StrideKind.WALK_TO_RUN], start, ours)),
-    ]
-    return Reproduction(
-        title="Fig. 6: walk-to-run stride with Table IV's gains",
-        columns=_EVENT_COLUMNS,
-        rows=_event_rows(published),
-        data=_stride_data(strides),
-        notes=(f"Apex at {published.state[1]:.4f} m; the paper keeps {APEX_HEIGHT:g} m.",),
-        figures={"fig6": _drawn(strides, "walk to run")},
-    )
+    ours = _stride("WRT", walk_to_run(target)[MapKind.IMPROVED].controls)
+    note = f"Apex at {published.state[1]:.4f} m; the paper keeps {APEX_HEIGHT:g} m."
+    return _compared("fig6", "walk to run", published, ours, note)
 
 
 def fig7() -> Reproduction:
     """Fig. 7: the RWT stride on the exact model, with Table IV's gains and with ours."""
-    start = APEX.state(RWT_STATE)
-    ours = run_to_walk()[MapKind.IMPROVED].controls
-    strides = [
-        (
-            "Table IV's gains",
-            simulate_stride(P, STRIDE_START[StrideKind.RUN_TO_WALK], start, RWT_CONTROLS),
-        ),
-        ("improved map", simulate_stride(P, STRIDE_START[StrideKind.RUN_TO_WALK], start, ours)),
-    ]
-    end = strides[0][1].state
-    return Reproduction(
-        title="Fig. 7: run-to-walk stride with Table IV's gains",
-        columns=_EVENT_COLUMNS,
-        rows=_event_rows(strides[0][1]),
-        data=_stride_data(strides),
-        notes=(
-            f"VLO at dx/dt {end[2]:.4f} m/s, y {end[1]:.4f} m, dy/dt {end[3]:+.4f} m/s for the"
-            " target 1.1, 0.98, 0; the paper reports its walk to converge to 1.085, 0.9807,"
-            " -0.018.",
-        ),
-        figures={"fig7": _drawn(strides, "run to walk")},
+    published = _stride("RWT", RWT_CONTROLS)
+    ours, end = _stride("RWT", run_to_walk()[MapKind.IMPROVED].controls), published.state
+    note = (
+        f"VLO at dx/dt {end[2]:.4f} m/s, y {end[1]:.4f} m, dy/dt {end[3]:+.4f} m/s for the"
+        " target 1.1, 0.98, 0; the paper reports its walk to converge to 1.085, 0.9807, -0.018."
     )
+    return _compared("fig7", "run to walk", published, ours, note)
