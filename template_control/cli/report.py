@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
-import numpy as np
 from rich.table import Table
 
 from template_control.checks import option_types as values
@@ -23,6 +22,7 @@ from template_control.run.experiment import STEPS, Experiment, PreparedExperimen
 from template_control.run.live import QP_FAILURES
 from template_control.run.record import Record, RunInterrupted, one_line, recorded
 from template_control.run.simulation import simulate
+from template_control.run.summary import rms
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
 from template_control.terminal import figures_table, progress_bar, show, table
@@ -248,13 +248,12 @@ NO_STANDS = "the template cannot stand: it leaves out the stands, and begins in 
 
 def add_template(figures: dict[str, Any], record: Record, template: ScenarioRecord) -> None:
     """Add to a run's figures how it ended and its top speed, and the same of its template."""
-    error = template.section_state[1:, 0] - template.wanted_speed
     figures["completed"] = bool(record.arrived)
     figures["top_speed"] = float(record.section_state[:, 0].max())
     figures["template"] = {
         "completed": template.completed,
         "top_speed": float(template.section_state[:, 0].max()),
-        "speed_error_rms": float(np.sqrt(np.mean(error**2))) if error.size else None,
+        "speed_error_rms": rms(template.section_state[1:, 0] - template.wanted_speed),
     }
 
 

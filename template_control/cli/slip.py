@@ -13,7 +13,7 @@ import numpy as np
 from template_control import view
 from template_control.checks import option_types as values
 from template_control.cli.report import NO_STANDS, output_folder
-from template_control.run.summary import STRIDES
+from template_control.run.summary import STRIDES, rms
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import load_scenario
@@ -78,7 +78,7 @@ def summarise_scenario(record: ScenarioRecord) -> dict[str, Any]:
         "strides": {name: counts.get(kind, 0) for kind, name in STRIDES.items()},
         "duration": float(record.section_time[-1]),
         "distance": float(record.state[-1, 0] - record.state[0, 0]) if len(record.time) else 0.0,
-        "speed_error_rms": float(np.sqrt(np.mean(error**2))) if error.size else None,
+        "speed_error_rms": rms(error),
         "speed_error_max": float(np.max(np.abs(error))) if error.size else None,
         "not_reached": int(np.sum(~record.reached)),
         "last_section": record.section_state[-1].tolist(),

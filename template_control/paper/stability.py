@@ -256,11 +256,7 @@ def fig9(counts: tuple[int, int] = (100, 400)) -> Reproduction:
     name, most = f"Pz_in at alpha_min {angle}", "alpha_min from which Pz_in"
     rows: list[tuple[str, ...]] = [
         ("Pz_in, whole set", "", *(f"{100 * v[0]:.1f} %" for v in shares.values())),
-        (
-            f"Pz_in at alpha_min {angle}",
-            "100 %",
-            *(f"{100 * v[at]:.2f} %" for v in shares.values()),
-        ),
+        (name, "100 %", *(f"{100 * v[at]:.2f} %" for v in shares.values())),
         (f"{most} >= 99.9 %", "", *(f"{_least(v, 0.999):.1f} deg" for v in shares.values())),
         (f"{most} = 100 %", angle, *(f"{np.degrees(v):.2f} deg" for v in full.values())),
         ("states that fail", "", *(f"{int(np.sum(~v))}" for v in settled.values())),

@@ -264,7 +264,10 @@ class Experiment(Checked):
         if isinstance(motion, VelocityProfile | VelocityCommand):
             velocity, motion = velocity_route(robot, motion, e.course)
         if isinstance(motion, GaitSpec):
-            gait = _gait(motion, robot, e.tuning.torque_scale)
+            scale = e.tuning.torque_scale
+            if motion.apex_height is not None:
+                check_apex(robot, motion.run_speed(robot), motion.apex_height, scale)
+            gait = motion.of(robot, scale)
             if motion.from_stand or motion.to_stand:
                 motion, steps = _with_stands(motion, gait, e), None
             else:
@@ -409,12 +412,6 @@ def perturbed_start(gait: Gait, seed: int) -> tuple[float, float, float]:
     draw = np.random.default_rng(seed).uniform(-1.0, 1.0, 2)
     height = z[1] + 0.02 * draw[1] * length
     return float(z[0] * (1.0 + 0.05 * draw[0])), float(height), float(z[2])
-
-
-def _gait(spec: GaitSpec, robot: Biped, torque_scale: float) -> WalkingGait | RunningGait:
-    if spec.apex_height is not None:
-        check_apex(robot, spec.run_speed(robot), spec.apex_height, torque_scale)
-    return spec.of(robot, torque_scale)
 
 
 def _check_plane(robot: Biped, e: Experiment) -> None:

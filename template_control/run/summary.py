@@ -71,9 +71,8 @@ def completed_strides(record: Record) -> dict[str, int]:
     return {names.get(kind, kind): count for kind, count in kinds.items()}
 
 
-def _speed_error(record: Record) -> float | None:
-    """Root mean square of dx/dt at the sections less what the stride was to end in [m/s]."""
-    error = record.section_state[1:, 0] - record.section_target[:-1, 0]
+def rms(error: Array) -> float | None:
+    """Root mean square; None of nothing."""
     return float(np.sqrt(np.mean(error**2))) if error.size else None
 
 
@@ -81,11 +80,10 @@ def _accepted(record: Record) -> dict[str, Any]:
     """Strides whose planner took another speed for the wanted one, and errors from that speed."""
     accepted = record.section_accepted[:-1]
     off = np.abs(accepted - record.section_target[:-1, 0])
-    error = record.section_state[1:, 0] - accepted
     return {
         "strides": int(np.sum(off > _TAKEN)),
         "most": float(off.max(initial=0.0)),
-        "error_rms": float(np.sqrt(np.mean(error**2))) if error.size else None,
+        "error_rms": rms(record.section_state[1:, 0] - accepted),
     }
 
 
@@ -99,12 +97,6 @@ def _nearest(record: Record) -> dict[str, float]:
 def _quantiles(seconds: Array) -> dict[str, float]:
     median, p99 = np.percentile(seconds, [50, 99]) if len(seconds) else (0.0, 0.0)
     return {"median": float(median), "p99": float(p99)}
-
-
-def _solving(seconds: Array) -> dict[str, float]:
-    """Of the ticks in which ProxQP worked, and their share."""
-    works = seconds > 0.0
-    return {**_quantiles(seconds[works]), "share": float(works.mean())}
 
 
 @checked
@@ -139,7 +131,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
     counted: dict[str, Any] = asdict(record.summary)
     del counted["joint_work"]
     walked = float(record.com[-1, 0] - record.com[0, 0])
-    touching = record.contact_force[:, :, 1] > 0.0
+    touching, solving = record.contact_force[:, :, 1] > 0.0, record.solve_seconds > 0.0
     return {
         "robot": record.robot_name,
         "gait": record.gait_name,
@@ -150,7 +142,7 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         "duration": duration,
         "mean_speed": walked / max(float(record.time[-1]), 1e-9),
         **_sections(record),
-        "speed_error_rms": _speed_error(record),
+        "speed_error_rms": rms(record.section_state[1:, 0] - record.section_target[:-1, 0]),
         "accepted_speed": _accepted(record),
         "nearest_speed_taken": _nearest(record),
         **counted,
@@ -164,7 +156,10 @@ def summarise(record: Record, path: str | None) -> dict[str, Any]:
         },
         "duty_factor": float(np.mean(touching)),
         "control_tick_seconds": _quantiles(record.tick_seconds),
-        "qp_solve_seconds": _solving(record.solve_seconds),
+        "qp_solve_seconds": {
+            **_quantiles(record.solve_seconds[solving]),
+            "share": float(solving.mean()),
+        },
         "plan_seconds": _quantiles(record.plan_seconds),
         "real_time_factor": duration / record.wall_seconds,
         "steps_not_nominal": int(np.sum(~record.section_nominal)),
@@ -185,22 +180,18 @@ def floating_summary(record: FloatingRecord) -> dict[str, Any]:
     double stance).
     """
     angles = record.attitude
-    rms, most = np.sqrt(np.mean(angles**2, axis=0)), np.abs(angles).max(axis=0)
+    size, most = np.sqrt(np.mean(angles**2, axis=0)), np.abs(angles).max(axis=0)
     quarter = max(len(angles) // 4, 1)
     drift = float(np.mean(angles[-quarter:, 2]) - np.mean(angles[:quarter, 2]))
     hundreds = 0.75 * max(record.steps, 1) / 100.0
     widths = step_widths(record)
-    width = (
-        {"mean": widths.mean(), "deviation": widths.std(), "least": widths.min()}
-        if len(widths)
-        else None
-    )
+    of: dict[str, Any] = {"mean": np.mean, "deviation": np.std, "least": np.min}
     return {
-        "attitude_rms": dict(zip(_ANGLES, rms.tolist(), strict=True)),
+        "attitude_rms": dict(zip(_ANGLES, size.tolist(), strict=True)),
         "attitude_max": dict(zip(_ANGLES, most.tolist(), strict=True)),
         "turned": float(record.heading[-1] - record.heading[0]),
         "mean_yaw_drift": drift / hundreds,
-        "step_width": None if width is None else {k: float(x) for k, x in width.items()},
+        "step_width": {k: float(f(widths)) for k, f in of.items()} if len(widths) else None,
     }
 
 
