@@ -20,10 +20,7 @@ _UNBOUNDED = 10_000  # columns: no line of a table is cut or wrapped in a file o
 
 
 def plain_console(stderr: bool = False) -> Console:
-    """A console that takes no text for markup or emoji.
-
-    The names of robots, scenarios and files are a user's: ``[/b]`` or ``:bus:`` is no order.
-    """
+    """A console that takes no text, such as a user's name of a robot, for markup or emoji."""
     console = Console(stderr=stderr, markup=False, emoji=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = _UNBOUNDED

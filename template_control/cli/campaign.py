@@ -137,12 +137,7 @@ def report(found: Campaign, files: Files, folder: Path) -> Report:
 
 
 def data(found: Campaign, falls: dict[int, Path]) -> dict[str, Any]:
-    """The campaign as plain data; ``falls`` are the files of the trials that went wrong, by number.
-
-    robot, gait, plant, trials, mix; fell and astray (count, share, and low and high of its 95 %
-    interval); reasons (count by what went wrong first); wrong: number, fell, reason, first,
-    speed_error, severity, config.
-    """
+    """The campaign as plain data; ``falls`` are the files of what went wrong, by number."""
     conditions = found.conditions
     table = settings.to_table(conditions.experiment.resolved())
     columns = ("number", "fell", "reason", "first", "speed_error", "severity")

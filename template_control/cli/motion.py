@@ -10,6 +10,7 @@ from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import ALL, SCENARIO
 from template_control.cli.interrupts import INTERRUPTED
+from template_control.cli.notices import notice
 from template_control.cli.report import (
     NO_STANDS,
     add_output_options,
@@ -25,6 +26,7 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
+from template_control.storage import Files
 from template_control.terminal import plain_console
 
 _KEPT = (
@@ -67,17 +69,20 @@ class Motion:
         experiment = experiment_from(options, self.default)
         prepared = experiment.prepare()
         template = _template_of(prepared.motion) if self.template else None
-        kept = run_and_keep(options, experiment, prepared, self.doing, template)
-        figures = summarise(kept.record, kept.path)
+        files = Files()
+        record, path = run_and_keep(options, experiment, prepared, self.doing, template, files)
+        figures = summarise(record, path)
         if template is not None:
-            add_template(figures, kept.record, template)
+            add_template(figures, record, template)
         if options.json:
             print(json.dumps(figures))
         else:
             print_table(figures)
-        if kept.interrupted():
+        files.raise_pending()
+        if record.interrupted:
+            notice(f"interrupted: the run up to here is in {path}")
             return INTERRUPTED
-        return 1 if kept.record.fell else 0
+        return 1 if record.fell else 0
 
 
 def _template_of(motion: Gait | Route) -> ScenarioRecord:

@@ -6,7 +6,6 @@ import argparse
 import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -48,38 +47,21 @@ def output_folder(folder: Path) -> Iterator[Path]:
         yield folder
 
 
-@dataclass(frozen=True)
-class Kept:
-    """A run, its files, and the path of its own file; None if that could not be written."""
-
-    record: Record
-    path: str | None
-    files: Files
-
-    def interrupted(self) -> bool:
-        """True if Ctrl-C ended the run; raises what befell its files, after the table."""
-        self.files.raise_pending()
-        if not self.record.interrupted:
-            return False
-        notice(f"interrupted: the run up to here is in {self.path}")
-        return True
-
-
 def run_and_keep(
     options: argparse.Namespace,
     experiment: Experiment,
     prepared: PreparedExperiment,
     doing: str,
-    template: ScenarioRecord | None = None,
-) -> Kept:
-    """Do a run; write it, what repeats it, and its figures.
+    template: ScenarioRecord | None,
+    files: Files,
+) -> tuple[Record, str | None]:
+    """Do a run; write it, what repeats it, and its figures; the record, and the path of its file.
 
     ``experiment`` is as it is written, ``prepared`` the same as it is run, ``template`` the same
     scenario on the robot's template. If a part of the user's own fails, that goes up as a
     TemplateControlError; what was recorded until then is kept, and the traceback of any other error
     is printed.
     """
-    files = Files()
     ends = isinstance(prepared.planner, Mapping)  # of a route; a gait is kept for ever
     total = prepared.steps or (None if ends else STEPS)
     with output_folder(options.output) as folder, stdout_to_stderr():
@@ -99,7 +81,7 @@ def run_and_keep(
             files.write(lambda: template.save(folder / TEMPLATE))
         if not (options.no_figures or record.interrupted):
             files.write(lambda: draw(options, record, folder, template))
-    return Kept(record, None if path is None else str(path), files)
+    return record, None if path is None else str(path)
 
 
 def _give_up(error: Exception, experiment: Experiment, folder: Path) -> NoReturn:

@@ -90,13 +90,7 @@ def report(found: Robustness) -> Report:
 
 
 def data(found: Robustness) -> dict[str, Any]:
-    """The findings as plain data; levels and breaking points in SI units.
-
-    robot, plant, gait (mean_speed, and vlo_height or, of a run, apex_height), undisturbed
-    (speed_error, height_error), disturbances: by name trials, breaking_point, half_point,
-    standing_point (null where the mildest level is beyond it), template (its own limit; null
-    without one) and levels (level, success_rate, interval with 95 %, fell, astray).
-    """
+    """The findings as plain data; levels and breaking points in SI units."""
     height = "apex_height" if isinstance(found.gait, RunningGait) else "vlo_height"
     return {
         "robot": found.robot,

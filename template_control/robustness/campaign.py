@@ -39,19 +39,10 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True)
 class DisturbanceSample(Checked):
-    """Disturbances of one trial; units and meaning as in :class:`DisturbanceDistribution`.
+    """Disturbances of one trial.
 
-    Attributes:
-        speed, height: how far off its gait the robot starts.
-        friction: of the ground.
-        mass: error of every link's.
-        push: impulse on the trunk.
-        direction: of the push, to the left of forward [deg].
-        push_at: when it begins, in steps from the start.
-        ground_step: height of the step.
-        ground_step_at: place of its edge, in step lengths from the start.
-        noise: of the sensors.
-        delay: of the torques.
+    As :class:`DisturbanceDistribution`, whose ranges they are drawn from; ``push_at`` is in steps
+    from the start, ``ground_step_at`` in step lengths.
     """
 
     speed: float = 0.0

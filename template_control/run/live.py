@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
@@ -33,7 +34,7 @@ from template_control.run.hand import Hand
 from template_control.run.metadata import conditions
 from template_control.run.record import Record
 from template_control.run.recorder import RECORD, Recorder
-from template_control.run.sensing import ContactSensors, Senses, TorqueDelay
+from template_control.run.sensing import ContactSensors, Senses
 from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
@@ -237,7 +238,7 @@ class LiveRun:
         o, plant, controller, hand = self._o, self.plant, self.controller, self.hand
         robot, supervisor, recorder = controller.robot, controller.supervisor, self.recorder
         dt = o.world.time_step
-        delay = TorqueDelay(o.delay_ticks)
+        torques: deque[Array] = deque(maxlen=o.delay_ticks + 1)  # until they act
         q, v = robot.neutral(), np.zeros(robot.nv)
         forces = np.zeros((len(robot.feet), robot.contact_rows))
         contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
@@ -283,7 +284,8 @@ class LiveRun:
             yield Tick(tick, now, done, q, v, forces, push=push, solution=solution)
             try:
                 force = self._backend.force(*push) if along or lateral else ()
-                plant.step(delay.pass_on(solution.torque), *force)
+                torques.extend([solution.torque] * (1 if torques else o.delay_ticks + 1))
+                plant.step(torques[0], *force)
             except DivergedError as error:
                 self.reason = f"the simulation diverged at {now:.3f} s: {error}"
                 return

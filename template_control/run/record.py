@@ -19,8 +19,9 @@ from template_control.checks.checked import checked
 from template_control.errors import RecordError, TemplateControlError
 from template_control.plant.terrain import Terrain
 from template_control.robot.biped import leg_means
+from template_control.run import tables
 from template_control.run.facts import METADATA, Facts
-from template_control.run.tables import Quantity, quantities, to_dataframe, to_xarray
+from template_control.run.tables import Quantity, quantities
 from template_control.slip.automaton.vocabulary import Phase
 
 R = TypeVar("R", bound="Record")
@@ -173,31 +174,8 @@ class Record(Facts):
             f" {self.duration:.2f} s, {len(self.time)} samples{end}>"
         )
 
-    def to_dataframe(self) -> Any:
-        """The run as a pandas ``DataFrame``: a row a sample, a column a quantity.
-
-        Columns are named after the fields of this class and what their axes stand for, such as
-        ``time``, ``q_pitch``, ``torque_left_knee``, ``com_x`` and ``contact_force_left_foot_y``.
-        ``frame.attrs["units"]`` has the SI unit of each column by name.
-
-        Raises:
-            MissingPackageError: if pandas is not installed.
-        """
-        return to_dataframe(self)
-
-    def to_xarray(self) -> Any:
-        """The run as an xarray ``Dataset``: every array with its dimensions, labels and units.
-
-        Dimensions are ``time``, ``section`` and ``tick``, and ``joint``, ``foot``, ``leg``,
-        ``axis`` and the like, whose coordinates hold the names. Each variable's
-        ``attrs["units"]`` is its SI unit; where entries differ, their names' coordinate has a
-        coordinate of units with it. ``attrs`` of the set holds the facts of the run that are
-        numbers or texts.
-
-        Raises:
-            MissingPackageError: if xarray is not installed.
-        """
-        return to_xarray(self)
+    to_dataframe = tables.to_dataframe
+    to_xarray = tables.to_xarray
 
     def plot(self, figure: str = "stick_diagram") -> Any:
         """Draw one figure of the run, as :func:`template_control.plot` does.

@@ -1,8 +1,7 @@
-"""Sensor models of a run, and the delay of its torques."""
+"""Sensor models of a run."""
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
@@ -132,21 +131,6 @@ class ContactSensors:
         forces[wrong] = 0.0
         forces[wrong & touching, -1] = self._threshold
         return touching, forces
-
-
-class TorqueDelay:
-    """Torques that act some ticks after their measurement; until then the first one is held."""
-
-    def __init__(self, ticks: int) -> None:
-        self._line: deque[Array] = deque(maxlen=ticks + 1)
-
-    def pass_on(self, torque: Array) -> Array:
-        """Take this tick's torques (nu,), an array of their own; returns those that act now."""
-        line = self._line
-        line.append(torque)
-        while len(line) < (line.maxlen or 0):
-            line.append(line[0])
-        return line[0]
 
 
 class FilteredSensors:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from collections.abc import Mapping
 from dataclasses import fields
@@ -115,28 +116,45 @@ def columns(record: Any) -> dict[str, Column]:
     return found
 
 
-def to_dataframe(record: Any) -> Any:
-    """A run as a pandas ``DataFrame``, see :meth:`.record.Record.to_dataframe`."""
+def _package(name: str, function: str) -> Any:
     try:
-        import pandas
+        return importlib.import_module(name)
     except ImportError:
         raise MissingPackageError(
-            "to_dataframe needs pandas, which is not installed: pip install pandas"
+            f"{function} needs {name}, which is not installed: pip install {name}"
         ) from None
+
+
+def to_dataframe(record: Any) -> Any:
+    """The run as a pandas ``DataFrame``: a row a sample, a column a quantity.
+
+    Columns are named after the fields of the record and what their axes stand for, such as
+    ``time``, ``q_pitch``, ``torque_left_knee``, ``com_x`` and ``contact_force_left_foot_y``.
+    ``frame.attrs["units"]`` has the SI unit of each column by name.
+
+    Raises:
+        MissingPackageError: if pandas is not installed.
+    """
     table = columns(record)
-    frame = pandas.DataFrame({name: column.values for name, column in table.items()})
+    frame = _package("pandas", "to_dataframe").DataFrame(
+        {name: column.values for name, column in table.items()}
+    )
     frame.attrs["units"] = {name: column.unit for name, column in table.items()}
     return frame
 
 
 def to_xarray(record: Any) -> Any:
-    """A run as an xarray ``Dataset``, see :meth:`.record.Record.to_xarray`."""
-    try:
-        import xarray
-    except ImportError:
-        raise MissingPackageError(
-            "to_xarray needs xarray, which is not installed: pip install xarray"
-        ) from None
+    """The run as an xarray ``Dataset``: every array with its dimensions, labels and units.
+
+    Dimensions are ``time``, ``section`` and ``tick``, and ``joint``, ``foot``, ``leg``, ``axis``
+    and the like, whose coordinates hold the names. Each variable's ``attrs["units"]`` is its SI
+    unit; where entries differ, their names' coordinate has a coordinate of units with it. ``attrs``
+    of the set holds the facts of the run that are numbers or texts.
+
+    Raises:
+        MissingPackageError: if xarray is not installed.
+    """
+    xarray = _package("xarray", "to_xarray")
     # A variable cannot have the name of a dimension that it does not run along alone.
     renamed = {"joint": "joint_position", "foot": "foot_position", "section": "section_kind"}
     found, used = {}, set()

@@ -138,13 +138,8 @@ class VelocityCommand:
     def set(self, forward: float, left: float = 0.0, turning: float = 0.0) -> None:
         """Want another velocity from now on.
 
-        Args:
-            forward: mean velocity ahead [m/s].
-            left: to the left [m/s].
-            turning: rate of the heading, to the left [rad/s].
-
-        Raises:
-            ParameterError: if one of them is out of its range; the velocity stays as it was.
+        As :class:`VelocityCommand`. A ParameterError if a number is out of its range; the velocity
+        stays.
         """
         self._velocity: Velocity = (
             check("the commanded forward speed", forward, ForwardSpeed, ParameterError),
