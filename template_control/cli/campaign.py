@@ -77,11 +77,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Run the trials as the options say; returns 0, or 130 after Ctrl-C.
-
-    Raises:
-        TemplateControlError: naming the option that is wrong.
-    """
+    """Run the trials as the options say; returns 0, or 130 after Ctrl-C."""
     experiment = experiment_from(options, Experiment())
     default = FLOATING_MIX if experiment.free else DisturbanceDistribution()
     mix = default if options.mix is None else settings.read(DisturbanceDistribution, options.mix)

@@ -141,11 +141,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Follow the branch and report it.
-
-    Raises:
-        ParameterError: naming the option that is out of its range or does not fit another.
-    """
+    """Follow the branch and report it."""
     _complete(options)
     with nullcontext() if options.no_figures else writing(options.output) as folder:
         if options.family:

@@ -23,11 +23,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print the keys; returns 0.
-
-    Raises:
-        ParameterError: if no key has the word in it.
-    """
+    """Print the keys; returns 0."""
     found = [leaf for leaf in settings.leaves(Experiment) if options.word in leaf.path]
     if not found:
         raise ParameterError(f"no key has {options.word!r} in it: keys alone lists all of them")

@@ -74,11 +74,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write what is asked for, or serve until Ctrl-C.
-
-    Raises:
-        ParameterError: if a film's name has the wrong ending, or a number is out of its range.
-    """
+    """Write what is asked for, or serve until Ctrl-C."""
     films = [(options.gif, ".gif"), (options.video, ".mp4")]
     for path, ending in films:
         if path is not None and path.suffix != ending:

@@ -26,11 +26,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Reproduce what was asked for.
-
-    Raises:
-        ParameterError: if there is no such reproduction.
-    """
+    """Reproduce what was asked for."""
     if options.name not in REPRODUCTIONS:
         raise ParameterError(
             f"no reproduction {options.name!r}: give one of {', '.join(REPRODUCTIONS)}"

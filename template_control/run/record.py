@@ -178,13 +178,10 @@ class Record(Facts):
     to_xarray = tables.to_xarray
 
     def plot(self, figure: str = "stick_diagram") -> Any:
-        """Draw one figure of the run, as :func:`template_control.plot` does.
+        """Matplotlib figure of the run, as :func:`template_control.plot` draws it.
 
         Args:
             figure: its name, a key of :data:`template_control.view.FIGURES`.
-
-        Returns:
-            The Matplotlib figure.
 
         Raises:
             ParameterError: if there is no such figure.

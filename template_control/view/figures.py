@@ -354,7 +354,7 @@ def save_figures(
     file_format: Format = "png",
     template: ScenarioRecord | None = None,
 ) -> list[Path]:
-    """Draw the figures of a run into files.
+    """Draw the figures of a run into files; returns their paths.
 
     Args:
         record: the run.
@@ -365,9 +365,6 @@ def save_figures(
         file_format: of the files.
         template: of a run through a scenario, the same one on the robot's template: there are
             figures of both then.
-
-    Returns:
-        The paths of the files.
 
     Raises:
         ParameterError: if there is no such figure of this run.

@@ -115,14 +115,11 @@ def _around_transitions(
 
 @checked
 def save_scenario_figures(record: ScenarioRecord, folder: str | Path) -> list[Path]:
-    """Write the figures as PNG; a run without transitions has no energy figure.
+    """Write the figures as PNG, and return their paths; without transitions none of energies.
 
     Args:
         record: the scenario's run.
         folder: where the files go; it must exist.
-
-    Returns:
-        The paths of the files.
 
     Raises:
         RecordError: if a file cannot be written.

@@ -142,14 +142,11 @@ def _level_panel(axes: Axes, finding: Finding) -> None:
 
 
 def study_figure(study: Study, result: SweepResult) -> Figure:
-    """The first figure of a study: a heat map of a grid of two axes, else over the first axis.
+    """Matplotlib figure of a study's first: a heat map of a grid of two axes, else over the first.
 
     Args:
         study: the question.
         result: its trials.
-
-    Returns:
-        The Matplotlib figure.
 
     Raises:
         SweepError: if the study's first figure is no number.
