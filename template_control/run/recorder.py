@@ -24,6 +24,7 @@ from template_control.robot.terms import LEGS, PATCH, UP
 from template_control.run.metadata import about, outcome
 from template_control.run.record import FloatingRecord, Record, SoleRecord
 from template_control.run.statistics import Counts, Statistics, count, statistics
+from template_control.run.tables import quantities
 from template_control.warm_up import Part, ready
 from template_control.whole_body.solver import Solution
 from template_control.whole_body.task import References
@@ -33,42 +34,36 @@ _CLOCKS = ("tick_seconds", "solve_seconds")  # kept of all ticks
 _KINDS = {"node": np.int64, "rear": np.int64, "solved": np.bool_}
 
 
-def _columns(robot: Biped) -> dict[str, tuple[int, ...]]:
-    """Shapes of the columns of a robot's record, in the order in which :func:`write_row` fills."""
-    nu, contacts = len(robot.joint_names), len(robot.feet)
-    numbers = ("time", "push", "interval", "tick_seconds", "solve_seconds", "solved")
-    found: dict[str, tuple[int, ...]] = {
-        **dict.fromkeys(numbers, ()),
-        "heading": (),
-        "q": (robot.nq,),
-        "v": (robot.nv,),
-        "torque": (nu,),
-        "joint": (nu, 2),
-        "foot": (contacts, 2),
-        "contact_force": (contacts, 2),
-        "com": (2,),
-        "com_velocity": (2,),
-        "angular_momentum": (),
-        "node": (),
-        "rear": (),
-        "stands": (),
-        "template_com": (2,),
-        "template_velocity": (2,),
-        "template_force": (LEGS, 2),
-        "swing_reference": (LEGS, 2),
-    }
-    if robot.directions > UP:
-        found |= {
-            "space_com": (3,),
-            "space_foot": (contacts, 3),
-            "space_force": (contacts, 3),
-            "attitude": (3,),
-            "sway": (2,),
-            "side_reference": (LEGS,),
-        }
+# Columns of a row, in the order in which write_row fills them; a record has some of its own.
+_ORDER = (
+    *("time", "push", "interval", "tick_seconds", "solve_seconds", "solved", "heading"),
+    *("q", "v", "torque", "joint", "foot", "contact_force", "com", "com_velocity"),
+    *("angular_momentum", "node", "rear", "stands", "template_com", "template_velocity"),
+    *("template_force", "swing_reference", "space_com", "space_foot", "space_force", "attitude"),
+    *("sway", "side_reference", "sole_wrench"),
+)
+_HELPERS = ("interval", "heading", "stands")  # numbers that no planar record has
+
+
+def _kind_of(robot: Biped) -> type[Record]:
+    """Kind of a robot's record."""
     if robot.patches:
-        found["sole_wrench"] = (contacts, PATCH)
-    return found
+        return SoleRecord
+    return FloatingRecord if isinstance(robot, FloatingBaseBiped) else Record
+
+
+def _columns(robot: Biped) -> dict[str, tuple[int, ...]]:
+    """Shapes of the columns of a robot's rows, in their order."""
+    nu, contacts = len(robot.joint_names), len(robot.feet)
+    sizes = {"nq": robot.nq, "nv": robot.nv, "nu": nu, "n": contacts}
+    layouts = {name: of.layout.split() for name, of in quantities(_kind_of(robot)).items()}
+    return {
+        name: tuple(
+            sizes.get(axis) or int(axis) for axis in layouts.get(name, "T")[1:] if axis[0] != "<"
+        )
+        for name in _ORDER
+        if name in (*layouts, *_HELPERS)
+    }
 
 
 @compiled
@@ -357,9 +352,7 @@ class Recorder:
             error: that ended it, on one line.
         """
         self._close_block()
-        kind: type[Record] = Record if self._floating is None else FloatingRecord
-        if self.controller.robot.patches:
-            kind = SoleRecord
+        kind = _kind_of(self.controller.robot)
         table, clocks = (
             np.concatenate(list(parts.values())) for parts in (self._kept, self._clocks)
         )
