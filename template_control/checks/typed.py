@@ -41,3 +41,9 @@ def entries(where: str, texts: Iterable[str], form: str) -> dict[str, str]:
             raise ParameterError(f"{where}: {key} is given twice: give it once")
         found[key] = value
     return found
+
+
+def numbers(where: str, texts: Iterable[str], form: str, hint: Any) -> dict[str, float]:
+    """:func:`entries` whose values are numbers."""
+    found = entries(where, texts, form)
+    return {key: number(f"{where} {key}", text, hint) for key, text in found.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, NamedTuple
@@ -74,18 +75,7 @@ def _model(robot: str) -> RobotSpec:
     return RobotSpec(str(Path(robot).absolute()) if own else robot)
 
 
-def _locked(texts: list[str]) -> dict[str, float]:
-    found = typed.entries("--locked", texts, "JOINT=ANGLE with the angle in rad")
-    return {
-        joint: typed.number(f"--locked {joint}", text, Annotated[float, _TURN])
-        for joint, text in found.items()
-    }
-
-
-def _masses(option: str, texts: list[str]) -> dict[str, float]:
-    found = typed.entries(option, texts, "LINK=MASS with the mass in kg")
-    return {name: typed.number(f"{option} {name}", text, Positive) for name, text in found.items()}
-
+_masses = partial(typed.numbers, form="LINK=MASS with the mass in kg", hint=Positive)
 
 ROBOT = (
     Flag(
@@ -116,7 +106,7 @@ MASSES = (
         "robot.masses",
         "masses of links instead of the URDF's, known to the controller",
         {"nargs": "+", "metavar": "LINK=KG"},
-        lambda texts: _masses("--mass", texts),
+        partial(_masses, "--mass"),
     ),
     Flag(
         "--plant-gravity",
@@ -136,7 +126,7 @@ MASSES = (
         "world.robot.masses",
         "masses of links of the simulated robot, such as a payload's, unknown to the controller",
         {"nargs": "+", "metavar": "LINK=KG"},
-        lambda texts: _masses("--plant-mass", texts),
+        partial(_masses, "--plant-mass"),
     ),
 )
 OWN_URDF = (
@@ -159,7 +149,9 @@ OWN_URDF = (
         "of a 3D URDF: angles of locked joints; in its plane a robot's other joints are locked at"
         " 0",
         {"nargs": "+", "metavar": "JOINT=RAD"},
-        _locked,
+        lambda texts: typed.numbers(
+            "--locked", texts, "JOINT=ANGLE with the angle in rad", Annotated[float, _TURN]
+        ),
     ),
     Flag(
         "--foot-radius",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -92,7 +93,11 @@ def run(options: argparse.Namespace) -> int:
     for path in written:
         print(f"{path}: {path.stat().st_size / 1e6:.1f} MB")
     if not written:
-        _serve(record, {**part, "port": options.port}, options.no_browser)
+        with suppress(KeyboardInterrupt), replay(record, **part, port=options.port) as server:
+            print(f"replay at {server.url}, until Ctrl-C", flush=True)
+            if not options.no_browser:
+                server.open_browser()
+            server.wait()
     return 0
 
 
@@ -104,14 +109,3 @@ def _film(record: Record, path: Path, part: dict[str, Any]) -> Path:
             progress=lambda n: status.update(Text(f"drawing {path}, frame {n}")),
             **part,
         )
-
-
-def _serve(record: Record, part: dict[str, Any], no_browser: bool) -> None:
-    try:
-        with replay(record, **part) as server:
-            print(f"replay at {server.url}, until Ctrl-C", flush=True)
-            if not no_browser:
-                server.open_browser()
-            server.wait()
-    except KeyboardInterrupt:
-        return
