@@ -337,14 +337,7 @@ def run_campaign(
 
     A longer campaign begins with the trials of a shorter one, and goes on in its file.
 
-    Args:
-        conditions: what is tried.
-        trials: how many.
-        folder: for the trials' results, from which the same call goes on; None keeps them in
-            memory. They are those of this code and this URDF; a longer campaign goes on from a
-            shorter one's.
-        executor: where to run the trials; None for one process a core.
-        progress: show a bar on stderr.
+    Arguments as for :func:`~template_control.robustness.measure`; ``trials`` is how many.
 
     Raises:
         TemplateControlError: if robot or gait is not to be had.

@@ -88,10 +88,8 @@ class Hand:
     def set_velocity(self, forward: float, left: float = 0.0, turning: float = 0.0) -> None:
         """Want another velocity; it holds from the next VLO on.
 
-        Args:
-            forward: mean velocity ahead [m/s].
-            left: of a floating-base robot, to the left [m/s].
-            turning: of a floating-base robot, rate of the heading, to the left [rad/s].
+        Arguments as for :class:`~template_control.run.VelocityCommand`; a planar robot has only
+        the first.
 
         Raises:
             ParameterError: if the motion is no :class:`~.velocity.VelocityCommand`, a number is out

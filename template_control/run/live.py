@@ -198,9 +198,7 @@ class LiveRun:
     def record(self, *, interrupted: bool = False, error: str = "") -> Record:
         """The run so far, or as much of its end as is kept.
 
-        Args:
-            interrupted: whether Ctrl-C ended it.
-            error: that ended it, on one line.
+        Arguments as for :meth:`~template_control.run.Recorder.record`.
         """
         return self.recorder.record(self.reason, interrupted=interrupted, error=error)
 

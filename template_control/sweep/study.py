@@ -119,11 +119,7 @@ def run_study(
 ) -> SweepResult:
     """Run a study; each trial is on disk as soon as it is done, and a stopped study goes on.
 
-    Args:
-        study: the question, or its TOML file.
-        path: of the results file (JSON lines); None keeps the results in memory only.
-        executor: where to run, a Dask cluster's for one; None: one process a core.
-        options: see :class:`~.sweep.SweepOptions`.
+    Arguments as for :func:`~.sweep.sweep`; the study is the question, or its TOML file.
 
     Returns:
         Trials and their figures, in order; a trial that cannot be run has its reason in ``errors``.

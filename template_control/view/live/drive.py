@@ -45,18 +45,7 @@ class Drive:
     """A run on a page, driven by its visitors; ends with :meth:`close` or the ``with`` block.
 
     The loop is in the thread that calls :meth:`loop`; what the page asks for is done between two of
-    its frames. Without a tab the run waits.
-
-    Args:
-        experiment: robot, world and so on; its motion is the page's.
-        port: of the server; None: the first free one from 8080 up.
-        fps: frames per second.
-        folder: where ``save`` puts ``run.npz`` and ``run.toml``.
-
-    Raises:
-        MissingPackageError: if viser is not installed.
-        ParameterError: if the experiment has a motion, or no port is free.
-        RobotError: if there is no such robot.
+    its frames. Without a tab the run waits. Arguments as for :func:`drive`, of an experiment.
 
     Attributes:
         url: where a browser finds the page.
