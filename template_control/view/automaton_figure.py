@@ -182,13 +182,9 @@ def _arrow(axes: Axes, edge: Edge, begin: Array, end: Array, bend: float) -> Non
     """An arrow from one place to another, bent to its right by a share of its length."""
     ends = (begin[0], begin[1]), (end[0], end[1])
     arrow = FancyArrowPatch(*ends, arrowstyle="-|>", shrinkA=0.0, shrinkB=0.0, zorder=2)
-    arrow.set(connectionstyle=f"arc3,rad={bend}", mutation_scale=12, color=_color(edge))
-    arrow.set_linewidth(2.2 if edge.section else 1.2)
+    color, width = (_SECTION, 2.2) if edge.section else (_INK, 1.2)
+    arrow.set(connectionstyle=f"arc3,rad={bend}", mutation_scale=12, color=color, linewidth=width)
     axes.add_patch(arrow)
-
-
-def _color(edge: Edge) -> str:
-    return _SECTION if edge.section else _INK
 
 
 def _draw_edge(axes: Axes, edge: Edge, begin: Array, end: Array, bend: float) -> None:
@@ -217,7 +213,8 @@ def _draw_leaving(axes: Axes, edge: Edge, begin: Array, way: Array, target: str)
 
 
 def _label(axes: Axes, edge: Edge, place: Array, text: str, side: tuple[str, str]) -> None:
-    shown = axes.text(place[0], place[1], text, fontsize=_FONT - 1, color=_color(edge), zorder=5)
+    color = _SECTION if edge.section else _INK
+    shown = axes.text(place[0], place[1], text, fontsize=_FONT - 1, color=color, zorder=5)
     shown.set(ha=side[0], va=side[1], bbox={"facecolor": _PANEL, "edgecolor": "none", "pad": 0.5})
 
 

@@ -21,17 +21,6 @@ _UNUSED = "opening handshake failed"
 _LOCAL = ("127.0.0.1", "localhost", "[::1]")
 
 
-def viser() -> Any:
-    """The package, an optional one."""
-    try:
-        import viser as package
-    except ImportError:
-        raise MissingPackageError(
-            "to drive a robot needs the package viser: pip install 'template-control[live]'"
-        ) from None
-    return package
-
-
 def is_own(host: str, origin: str | None) -> bool:
     """True for a request of the page itself, or of a program, which sends no ``origin``.
 
@@ -73,12 +62,17 @@ class PageServer:
     """
 
     def __init__(self, port: int | None) -> None:
-        package = viser()
+        try:
+            import viser
+        except ImportError:
+            raise MissingPackageError(
+                "to drive a robot needs the package viser: pip install 'template-control[live]'"
+            ) from None
         logging.getLogger("websockets.server").addFilter(_is_news)
         chosen = free_port(PORTS if port is None else [port])
         others = set(threading.enumerate())
         with _closed_to_others(), redirect_stdout(io.StringIO()):  # it prints a table
-            self.viser = package.ViserServer(host=HOST, port=chosen, verbose=False)
+            self.viser: Any = viser.ViserServer(host=HOST, port=chosen, verbose=False)
         self._threads = set(threading.enumerate()) - others
         self.url = f"http://{HOST}:{chosen}/"
         if self.viser.get_port() != chosen:  # taken meanwhile: viser takes the next one
