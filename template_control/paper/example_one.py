@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from template_control.paper.reproduction import Reproduction
+from template_control.paper.reproduction import MAPS, Reproduction
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import example_one
@@ -14,7 +14,6 @@ from template_control.view.scenario_figures import energy_figure, scenario_figur
 
 _TOP_SPEED = 5.0
 _PAPER_STIFFNESS = 28.2e3
-_MAPS = (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
 
 
 def summary(record: ScenarioRecord) -> dict[str, Any]:
@@ -48,7 +47,7 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
 
 def fig10() -> Reproduction:
     """Example I on the paper's map, and the tracking error with each map."""
-    records = {kind: simulate_scenario(example_one(kind)) for kind in _MAPS}
+    records = {kind: simulate_scenario(example_one(kind)) for kind in MAPS}
     data = {kind.name.lower(): summary(record) for kind, record in records.items()}
 
     def row(name: str, published: str, text: Any) -> tuple[str, ...]:
@@ -90,7 +89,7 @@ def fig10() -> Reproduction:
     record = records[MapKind.PAPER]
     return Reproduction(
         title="Fig. 10: Example I",
-        columns=("", "paper", *(f"{kind.name.lower()} map" for kind in _MAPS)),
+        columns=("", "paper", *(f"{kind.name.lower()} map" for kind in MAPS)),
         rows=rows,
         data={**data, "published": {"stiffness_at_5": _PAPER_STIFFNESS}},
         notes=(

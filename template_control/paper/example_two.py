@@ -18,14 +18,14 @@ from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Context, Planner
 from template_control.embedding.robot_template import paper_gait, template_for
-from template_control.paper.reproduction import Reproduction
+from template_control.paper.reproduction import MAPS, Reproduction
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.run.experiment import Experiment
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
-from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits.basin import velocity_angle, vlo_state
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
@@ -170,7 +170,7 @@ PLANNERS: dict[str, Callable[[WalkingGait], Planner]] = {
         f"modified, {kind.name.lower()} map": partial(
             ModifiedPlanner, options=ModifiedOptions(map_kind=kind)
         )
-        for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
+        for kind in MAPS
     },
 }
 ALONE, FULL_GRIP = "template alone", "ideal, full grip"

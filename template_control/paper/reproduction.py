@@ -8,8 +8,12 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from template_control.slip.automaton.vocabulary import MapKind
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+MAPS = (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)  # whose errors are compared
 
 
 @dataclass(frozen=True)

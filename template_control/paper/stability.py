@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from template_control.arrays import Array, BoolArray, IntArray
-from template_control.paper.reproduction import Reproduction
+from template_control.paper.reproduction import MAPS, Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import (
     NUM_SLOTS,
@@ -247,7 +247,7 @@ def fig9(counts: tuple[int, int] = (100, 400)) -> Reproduction:
     stable = [p for p in branch(_FINE) if p.kind is Kind.STABLE]
     found = backward_set(gait, counts=counts)
     settled, shares, full = {}, {}, {}
-    for kind in (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT):
+    for kind in MAPS:
         name = f"{kind.name.lower()} map"
         settled[name] = settles(controlled_end(found, gait, kind), stable, gait)
         shares[name], full[name] = inside_share(found, settled[name], np.radians(_LEAST_ANGLES))

@@ -8,7 +8,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.paper.map_errors import stride_figure
-from template_control.paper.reproduction import Reproduction
+from template_control.paper.reproduction import MAPS, Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.control.controllers import RunToWalk, StepSolution, WalkToRun
@@ -25,7 +25,6 @@ APEX_HEIGHT = 0.98
 RWT_STATE = np.array([1.754, 0.9766])
 RWT_TARGET = np.array([1.1, 0.98, 0.0])
 RWT_CONTROLS = controls(np.radians(71.53), 66.97e3, 18.35e3)
-_MAPS = (MapKind.PAPER, MapKind.IMPROVED, MapKind.EXACT)
 _EVENTS = {
     "TOUCHDOWN": "touchdown",
     "VIRTUAL_BOTTOM": "virtual bottom",
@@ -38,12 +37,12 @@ _EVENTS = {
 
 def run_to_walk() -> dict[MapKind, StepSolution]:
     """The RWT controls from Table IV's state and target, by map."""
-    return {kind: RunToWalk(P, kind).solve(RWT_STATE, RWT_TARGET) for kind in _MAPS}
+    return {kind: RunToWalk(P, kind).solve(RWT_STATE, RWT_TARGET) for kind in MAPS}
 
 
 def walk_to_run(target: Array) -> dict[MapKind, StepSolution]:
     """The WRT controls from Table IV's state to ``target``, by map, on the full stride."""
-    return {kind: WalkToRun(P, kind).solve(WRT_STATE, target, WRT_CONTROLS) for kind in _MAPS}
+    return {kind: WalkToRun(P, kind).solve(WRT_STATE, target, WRT_CONTROLS) for kind in MAPS}
 
 
 _STRIDES = {

@@ -142,19 +142,13 @@ class Hand:
             begun: when each step began, and the duration of its gait's steps [s].
         """
         along = lateral = 0.0
-        over = []
-        for push in self._coming:
+        for push in list(self._coming):
             begin = push.begins(begun)
-            if begin is None or now < begin:
-                continue
-            if now >= begin + push.duration:
-                over.append(push)
-                continue
-            force = push.force()
-            along += force[0]
-            lateral += force[1]
-        for push in over:
-            self._coming.remove(push)
+            if begin is not None and now >= begin + push.duration:
+                self._coming.remove(push)
+            elif begin is not None and now >= begin:
+                ahead, left = push.force()
+                along, lateral = along + ahead, lateral + left
         return along, lateral
 
     def _check_friction(self) -> None:

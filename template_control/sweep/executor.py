@@ -65,7 +65,10 @@ def run_calls(
         try:
             while True:
                 for index, arguments in islice(calls, in_flight - len(under_way)):
-                    future = _submit(pool, token, function, arguments)
+                    try:
+                        future = pool.submit(_call, token, function, arguments)
+                    except RuntimeError as error:  # BrokenExecutor; or a pool that was shut down
+                        raise ExecutorLostError(str(error)) from None
                     under_way[future] = index
                     future.add_done_callback(done.put)
                 if not under_way:
@@ -91,15 +94,6 @@ def run_calls(
                 if future.done() and not future.cancelled() and future.exception() is None:
                     keep(index, future.result())
             raise
-
-
-def _submit(
-    pool: Executor, token: str, function: Callable[..., Any], arguments: dict[str, Any]
-) -> Future[Outcome]:
-    try:
-        return pool.submit(_call, token, function, arguments)
-    except RuntimeError as error:  # BrokenExecutor is one; so is a pool that was shut down
-        raise ExecutorLostError(str(error)) from None
 
 
 def _call(_: str, function: Callable[..., Any], arguments: dict[str, Any]) -> Outcome:
