@@ -12,6 +12,7 @@ DEPRECATED = {
     "template_control.Course": "template_control:HeadingCommand",
     "template_control.embedding.BreakingPlanner": "template_control.embedding:Planner",
     "template_control.embedding.ChangePlanner": "template_control.embedding:CurvePlanner",
+    "template_control.embedding.FloatingSnapshot": "template_control.embedding:Snapshot",
     "template_control.embedding.ForgettingPlanner": "template_control.embedding:Planner",
     "template_control.embedding.Free": "template_control.embedding:RestContext",
     "template_control.embedding.FreeController": "template_control.embedding:EmbeddingController",

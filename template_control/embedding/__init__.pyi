@@ -5,9 +5,9 @@ from .controller import EmbeddingController as EmbeddingController
 from .free.options import FREE_PHASES as FREE_PHASES
 from .free.options import FREE_PLANNER as FREE_PLANNER
 from .free.options import FreeOptions as FreeOptions
-from .learners.friction import FrictionOptions as FrictionOptions
-from .learners.lean import Lean as Lean
-from .learners.lean import LeanOptions as LeanOptions
+from .friction import FrictionOptions as FrictionOptions
+from .lean import Lean as Lean
+from .lean import LeanOptions as LeanOptions
 from .modes import GuardOptions as GuardOptions
 from .options import EmbeddingOptions as EmbeddingOptions
 from .phases import PHASES as PHASES
@@ -32,10 +32,10 @@ from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions
 from .planners.transition import TransitionPlanner as TransitionPlanner
 from .recovery import CatchOptions as CatchOptions
-from .robot_route import robot_route as robot_route
 from .robot_template import default_gait as default_gait
 from .robot_template import paper_gait as paper_gait
 from .robot_template import robot_gait_for_speed as robot_gait_for_speed
+from .robot_template import robot_route as robot_route
 from .robot_template import template_for as template_for
 from .robot_template import walking_speeds as walking_speeds
 from .rollout import ReplanOptions as ReplanOptions
@@ -45,7 +45,6 @@ from .standing.planners import CurvePlanner as CurvePlanner
 from .standing.planners import StepPlanner as StepPlanner
 from .standing.planners import gaits_by_speed as gaits_by_speed
 from .standing.planners import standing_planners as standing_planners
-from .state import FloatingSnapshot as FloatingSnapshot
 from .state import SectionReport as SectionReport
 from .state import Snapshot as Snapshot
 from .swing import HIGH_SWING as HIGH_SWING

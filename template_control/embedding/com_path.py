@@ -1,9 +1,15 @@
-"""The template's CoM path from now on, and its leg forces.
+"""The template's CoM path from now on, its leg forces, and the robot's place on it.
 
 World frame. The path is kept as the kernel's Taylor polynomials, so references of any order
 come from it exactly. In stance it is looked up by phase, the direction from the rear stance
 foot to the CoM (the angle beta of Section V-B); in flight, where nothing but time passes, by
 time.
+
+The legs' swing makes the robot's CoM run ahead of the template and fall back behind it within
+a step, while its angular momentum about the foot, on which all forces depend, stays the
+template's. So in stance the phase is that of a point that moves with dx/dt + L / (m y), L the
+angular momentum about the CoM: it starts in the CoM at every plan, and leads or lags it by
+centimetres.
 """
 
 from __future__ import annotations
@@ -11,7 +17,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,8 +30,7 @@ from template_control.slip.maps.section import VLO
 
 _NEWTON = 12
 _X, _Y = np.int64(0), np.int64(1)  # Numba would compile once for each literal int
-
-
+_TOUCHDOWN = int(Event.TOUCHDOWN)
 # Times of the reference template.
 _OVERRUN = 0.02  # [s] that a segment's polynomial is followed past its ends: template and robot do
 # not come to an event at the same time
@@ -33,54 +38,34 @@ _LEAP = 0.05  # [s], longest step of the search for a phase: far away Newton's s
 
 
 class Curve(NamedTuple):
-    """The segments of a path, in as few arrays as can be: each costs time at every call.
+    """The segments of a path, in as few arrays as can be: each costs time at every call."""
 
-    Attributes:
-        coefficients: (2, n, ORDER + 1) polynomials of x and y.
-        meta: (n, 7) start time, duration, node, toes, stiffnesses.
-        look: (3,) x of the template's rear toe, from which x is taken [m]; how far its polynomials
-            are followed past their ends, and the longest step of a search [s].
-    """
-
-    coefficients: Array
-    meta: Array
+    coefficients: Array  # (2, n, ORDER + 1) polynomials of x and y
+    meta: Array  # (n, 7) start time, duration, node, toes, stiffnesses
+    # (3,) x of the template's rear toe, from which x is taken [m]; how far the polynomials are
+    # followed past their ends, and the longest step of a search [s]
     look: Array
 
 
 class Landing(NamedTuple):
-    """Next touchdown of a leg; (nan, inf) if it does not land on this path.
+    """Next touchdown of a leg; (nan, inf) if it does not land on this path."""
 
-    ``x`` is its toe's in the world [m], ``time`` is on the path [s].
-    """
-
-    x: float
-    time: float
+    x: float  # of its toe in the world [m]
+    time: float  # on the path [s]
 
 
 @dataclass(frozen=True)
 class TemplatePath:
-    """Consecutive strides of the template, in one time and one world frame.
+    """Consecutive strides of the template, in one time and one world frame."""
 
-    Attributes:
-        strides: of which it is made, from its start on.
-        curve: the segments.
-        events: time on the path [s] and guard of each event.
-        landings: next touchdown of the leg that is rear, and of the one that is front, at the start
-            of the path.
-        toes: x of the rear and the front toe at the start [m].
-        section_state: (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex.
-        outcome: how the first stride ends.
-        duration: end of the last segment [s].
-    """
-
-    strides: tuple[Stride, ...]
-    curve: Curve
-    events: tuple[tuple[float, Event], ...]
-    landings: tuple[Landing, Landing]
-    toes: tuple[float, float]
-    section_state: Array
-    outcome: Outcome
-    duration: float
+    strides: tuple[Stride, ...]  # of which it is made, from its start on
+    curve: Curve  # the segments
+    events: tuple[tuple[float, Event], ...]  # time on the path [s] and guard of each
+    landings: tuple[Landing, Landing]  # of the legs that are rear and front at the start
+    toes: tuple[float, float]  # x of the rear and the front toe at the start [m]
+    section_state: Array  # (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex
+    outcome: Outcome  # how the first stride ends
+    duration: float  # end of the last segment [s]
 
     def time_of(self, event: Event, passed: int = 0) -> float:
         """Time of the next ``event`` [s], inf if there is none, once ``passed`` events are over."""
@@ -94,14 +79,9 @@ class TemplatePath:
         return found
 
     def after(self, event: Event, passed: int) -> int:
-        """Number of the path's events that are over once the next ``event`` is.
-
-        ``passed`` are over already; also returned where no such event is left.
-        """
-        for i in range(passed, len(self.events)):
-            if self.events[i][1] is event:
-                return i + 1
-        return passed
+        """Number of the path's events that are over once the next ``event`` is, if there is one."""
+        later = range(passed, len(self.events))
+        return next((i + 1 for i in later if self.events[i][1] is event), passed)
 
 
 def join(strides: Sequence[Stride], time_unit: float = 1.0) -> TemplatePath:
@@ -195,9 +175,8 @@ def at_direction(
 ) -> tuple[float, int]:
     """Time at which the template's CoM is in the direction of (x, y) [s], and its segment.
 
-    ``x``, ``y`` are the robot's CoM relative to its rear stance foot [m]; the arrays are a
-    :class:`Curve`'s; ``guess`` is a time close to the answer [s]. ``out`` (6,) is overwritten with
-    the path there, x relative to the template's rear toe.
+    ``x``, ``y`` are the robot's CoM relative to its rear stance foot [m]; ``guess`` is a time close
+    to the answer [s]. The path there is written into ``out`` (6,), as by :func:`sample`.
     """
     last = meta[meta.shape[0] - 1]
     end, leap = last[0] + last[1], look[2]
@@ -222,10 +201,7 @@ _FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and 
 
 @compiled
 def unload_cap(template_force: float, weight: float) -> float:
-    """Largest normal force of a foot that is about to lift off [N]: near the template's.
-
-    ``template_force`` is the vertical force of the template's leg at this phase [N].
-    """
+    """Largest normal force of a foot that is about to lift off [N]: near the template leg's."""
     return _UNLOADED * max(template_force, 0.0) + _FLOOR * weight
 
 
@@ -239,13 +215,9 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
     1/2 in the middle of both, and 0 at the other end of the ground that they bear it on. The assist
     of two legs moves load from one to the other, so that it lifts nothing.
 
-    Args:
-        meta_row: (7,) toes and stiffnesses of the path's segment; NaN for legs without springs.
-        toe: where x of the CoM is taken from [m].
-        com: (6,) x and y of the template's CoM, and their first and second derivatives.
-        body: (6,) m, g_y and g_x of gravity towards the ground and back along it, l0, the assist
-            of two legs, and the half length of a foot [kg, m/s^2, m/s^2, m, m/s^2, m].
-        forces: overwritten; zero for a leg in the air.
+    ``meta_row`` (7,) is of the path's segment, its stiffnesses NaN for legs without springs;
+    ``com`` (6,) is as :func:`sample` writes it, x from ``toe`` [m]; ``body`` is that of ``PATH``.
+    ``forces`` are zero for a leg in the air.
     """
     com_x, com_y, rest_length = com[0] + toe, com[1], body[3]
     if np.isnan(meta_row[5]):
@@ -277,3 +249,84 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
         forces[leg, 1] += share * com_y
         if forces[leg, 1] < 0.0:
             forces[leg, 0], forces[leg, 1] = 0.0, 0.0  # legs do not pull
+
+
+_F, _I = np.float64, np.int64
+PATH = np.dtype(
+    [
+        # -- the robot's place on it --
+        ("time", _F),  # along the path [s]
+        ("offset", _F),  # of the point whose direction is the phase, ahead of the CoM [m]
+        ("fresh", _I),  # whether the path begins at this tick
+        ("forces", _F, (2, 2)),  # leg forces of the template there, rear and front [N]
+        # -- the plan, written when it changes --
+        # m, g towards the ground and back along it, l0, assist of two legs, half a foot's length
+        ("body", _F, (6,)),
+        ("event_times", _F, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
+        ("landing_x", _F, (2,)),  # of each foot's next foothold [m]; NaN: none
+        ("landing_time", _F, (2,)),  # [s]; inf: never
+        ("toe", _F),  # x of the template's rear toe [m]
+        ("touchdown_angle", _F),  # of the stride [rad]
+        ("step_length", _F),  # of the planner's gait [m]
+        ("step_duration", _F),  # of it [s]
+        ("planned_at", _F),  # when the path began [s]
+        ("viable", _I),  # whether the template completes the path's strides, and goes on
+        ("without_touchdown", _I),  # whether an overdue touchdown has been taken off the path
+        # -- when it is planned anew --
+        ("patience", _F),  # with a touchdown [s]
+        ("interval", _F),  # between plans [s]
+        ("speed", _F),  # deviation of the forward speed [m/s]
+    ],
+    align=True,
+)
+"""The path that the supervisor has planned, and the robot's place on it."""
+
+KEPT, OVERDUE, STRAYED, LEADS_NOWHERE = range(4)
+"""Results of :func:`plan_is_due`: the path is kept, or why it is not."""
+
+
+@compiled
+def move_clock(
+    path: Any, curve: tuple[Array, Array, Array], s: Any, mode: Any, want: Any, motion: Array
+) -> None:
+    """Go on along ``path``, of ``PATH``, to where the robot is now, and write the CoM's reference.
+
+    ``s`` is of ``SENSED``, ``mode`` of ``MODE``, ``want`` of ``REFERENCES``; ``motion`` is dx/dt of
+    the CoM [m/s], and the time since the last tick [s].
+    """
+    speed, dt = motion
+    coefficients, meta, look = curve
+    x, y = s.state[0] + path.offset - s.toes[0], s.state[1]
+    # Since the last tick, unless the path begins at this one. A direction needs a guess only.
+    guess = path.time + (0.0 if path.fresh and not mode.by_direction else dt)
+    path.fresh = 0
+    if mode.by_direction:
+        path.time, row = at_direction(coefficients, meta, look, x, y, guess, want.com)
+    else:
+        path.time, row = guess, sample(coefficients, meta, look, guess, want.com)
+    path.offset += (s.state[2] - speed) * dt
+    toe, forces = look[0], path.forces
+    leg_forces(meta[row], toe, want.com, path.body, forces)
+    if meta[row, 3] != toe:
+        # Template and robot are on either side of liftoff: to each foot its own force.
+        for axis in range(2):
+            forces[0, axis], forces[1, axis] = forces[1, axis], forces[0, axis]
+
+
+@compiled
+def plan_is_due(path: Any, lands: bool, deviation: float, phase_time: float, now: float) -> int:
+    """Why the path, of ``PATH``, is to be planned anew at the time ``now`` [s], or ``KEPT``.
+
+    OVERDUE: the swing foot, which ``lands`` on it, should have found the ground by now. STRAYED: a
+    disturbance has carried the robot away from it, by ``deviation`` of the forward speed [m/s].
+    LEADS_NOWHERE: no stride goes on from it. ``phase_time`` is along it [s].
+    """
+    if path.without_touchdown:
+        return KEPT
+    if lands and phase_time > path.event_times[_TOUCHDOWN] + path.patience:
+        return OVERDUE
+    if now - path.planned_at <= path.interval:
+        return KEPT
+    if abs(deviation) > path.speed and phase_time > path.interval:
+        return STRAYED
+    return KEPT if path.viable else LEADS_NOWHERE

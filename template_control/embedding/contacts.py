@@ -51,7 +51,6 @@ class ContactOptions(Checked):
 
 
 _F, _I = np.float64, np.int64
-
 CONTACTS = np.dtype(
     [
         ("least", _F),  # horizontal force that a wall has at least [N]
@@ -82,16 +81,12 @@ NO_FORCE: Array = np.zeros((0, 2))
 
 @compiled
 def update_contacts(c: Any, flags: BoolArray, force: Array, dt: float) -> None:
-    """Take in the flags of a tick.
+    """Take in the flags (n,) of a tick, and the forces (n, d), forward first and up last [N].
 
     A flag that says what the path expects of its foot is believed at once: a foot stands, is in the
     air, or is due to land, where either flag is expected. Any other flag is believed after
     ``ContactOptions.doubt``. A foot pressed against a wall does not stand; one of several contacts
-    stands on one of them.
-
-    ``c``, of ``CONTACTS``, is overwritten but for ``expected``. ``flags`` (n,) say whether each
-    contact touches anything, ``force`` (n, d) is on each, forward first and up last [N];
-    ``NO_FORCE``: walls are not looked for. ``dt`` is since the last tick [s].
+    stands on one of them. With ``NO_FORCE`` walls are not looked for.
     """
     for foot in range(LEGS):
         c.standing[foot] = 0
@@ -119,10 +114,7 @@ def set_contacts(
     scale: Scale,
     groups: Sequence[Sequence[int]] = SINGLE,
 ) -> None:
-    """Write the constants of a robot's contacts into ``data`` (1,), of ``CONTACTS``.
-
-    ``options`` are scaled; ``weight`` is the robot's [N], ``groups`` are the contacts of each foot.
-    """
+    """Write the constants of a robot of a weight [N], and of its feet's contacts, into ``data``."""
     now = data[0]
     now["contacts"] = sum(map(len, groups))
     for foot, group in enumerate(groups):

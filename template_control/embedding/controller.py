@@ -18,22 +18,16 @@ import numpy as np
 from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
 from template_control.embedding.contacts import NO_FORCE, forget_contacts, set_contacts
-from template_control.embedding.free.course import Course
-from template_control.embedding.free.motion import LateralMotion
+from template_control.embedding.free.motion import Course, LateralMotion
 from template_control.embedding.free.options import FreeOptions, default_options
 from template_control.embedding.ground import SlopeEstimate, SlopeFrame
-from template_control.embedding.learners.learners import Learners
-from template_control.embedding.modes import PLACED, PathClock, check_legs, modes, set_guards
+from template_control.embedding.learners import Learners
+from template_control.embedding.modes import PLACED, check_legs, first_fired, modes, set_guards
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Cause, Planner, Planners
 from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.recovery import NEEDED, Recovery
-from template_control.embedding.state import (
-    FloatingSnapshot,
-    SectionReport,
-    Snapshot,
-    StateObserver,
-)
+from template_control.embedding.state import SectionReport, Snapshot, StateObserver
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet, Swings
 from template_control.embedding.tick import (
@@ -44,7 +38,6 @@ from template_control.embedding.tick import (
     act,
     advance,
     feel_in_space,
-    fired_edge,
     look,
     sense,
     solve,
@@ -86,7 +79,6 @@ class EmbeddingController:
         supervisor: the stride's decision and the path that follows it.
         swings: shapes of the swings in phases that have none of their own.
         feet: roles and swings of the feet.
-        path_clock: the robot's place on that path, and the template there.
         learners: what is learnt from stride to stride.
         slope: the ground's, by the footholds, uphill along the world's x.
         frame: axes that lean with the ground.
@@ -135,11 +127,10 @@ class EmbeddingController:
         self.references = References(pitch=o.trunk_pitch)
         self.swings = Swings.of(robot, scale, o.swing)
         self.feet = Feet(self.references.foot, tick["feet"])
-        com = self.references.com
-        self.path_clock = PathClock(self.parameters, o.replan, com, tick["path"], robot.half_length)
         weight = robot.mass * robot.gravity
         set_contacts(tick["contacts"], o.contacts, weight, scale, robot.groups)
-        self.observer = StateObserver(robot, self.feet, com[4:], tick["sensed"])
+        sensed = tick["sensed"], tick["mode"]
+        self.observer = StateObserver(robot, self.feet, self.references.com[4:], *sensed)
         set_guards(tick["guards"], self.parameters, o.guards)
         check_legs(automaton, robot)
         self._modes = modes(automaton, robot.nv, o.phases)
@@ -148,7 +139,9 @@ class EmbeddingController:
         curved = {name for name, mode in self._modes.items() if mode.control.follow_curve}
         recovers = o.catches and automaton is AUTOMATON and planners.keys() >= NEEDED
         recovery = Recovery(self.parameters) if recovers else None
-        self.supervisor = StrideSupervisor(route, planners, o.replan, automaton, curved, recovery)
+        rules, path = (o.replan, automaton, curved, recovery), tick["path"]
+        self.supervisor = StrideSupervisor(route, planners, *rules, path)
+        path["body"][0, 5] = robot.half_length
         self._enter(next(iter(self._modes)))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
@@ -185,11 +178,10 @@ class EmbeddingController:
         """Node, phase, template and swing references of the last tick."""
         seen = np.zeros(1, SNAPSHOT)
         look(*self.memory, seen)
-        kind = Snapshot if self.lateral is None else FloatingSnapshot
-        found = {field.name: seen[field.name][0] for field in fields(kind)}
+        found = {field.name: seen[field.name][0] for field in fields(Snapshot)}
         for name, number in (("time", float), ("phase", float), ("rear", int), ("stands", bool)):
             found[name] = number(found[name])
-        return kind(**{**found, "node": self.mode.node.name})
+        return Snapshot(**{**found, "node": self.node.name})
 
     def first_pitch(self) -> float:
         """Of the trunk where the route begins [rad]."""
@@ -238,7 +230,7 @@ class EmbeddingController:
             # The liftoff before has made the foot that stood the front leg's.
             self.feet.landed = self.feet.foot_of_leg[Leg.FRONT]
         forget_contacts(self._tick["contacts"])
-        self._read()
+        self.observer.read()
         self._decide(section)
         self._slope_unknown = len(self.mode.stance) > 1 and self.frame.turns
         self._publish()
@@ -295,7 +287,7 @@ class EmbeddingController:
         """See to what has happened: an edge of the present node, or a plan that is due."""
         if self._slope_unknown:
             self._find_first_slope()
-        edge = fired_edge(self._tick)
+        edge = first_fired(self._tick[0])
         if edge >= 0:
             self._traverse(self.mode.outgoing_edges[edge])
         self._replan()
@@ -303,10 +295,8 @@ class EmbeddingController:
 
     def _publish(self) -> None:
         """Write the plan to where ticks read it."""
-        now = self._tick[0]
-        self.path_clock.take(self.supervisor)
         stand(*self._memory)
-        now["trim"] = self.learners.trim.acceleration
+        self._tick["trim"] = self.learners.trim.acceleration
         sideways = None if self.lateral is None else self.lateral.plan(self.supervisor)
         self._plan: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
         self._room: tuple[Array, ...] | None = None  # all of ``_kept`` is to be kept anew
@@ -336,11 +326,7 @@ class EmbeddingController:
         self.slope.stand(self.frame.foothold(rear), self.frame.foothold(front))
         if self._tilt_axes(self.slope.slope, front):
             self.supervisor.follow(self.node, self.observer.now, self.time)
-            self.path_clock.restart()
             self._publish()
-
-    def _read(self) -> None:
-        self.observer.read(self.mode.data)
 
     def _traverse(self, edge: Edge) -> None:
         """Go along an edge: roles and swings of the feet, plan, node."""
@@ -360,14 +346,13 @@ class EmbeddingController:
             # A step back: the other foot is the one on the ground.
             observer.stand_on(self.feet.foot_of_leg[stance[0]])
         if lifted or self.feet.foot_of_leg != roles:
-            observer.take_roles(self.mode.data)
+            observer.take_roles()
             self.supervisor.set_rear_toe(self.feet.foot_of_leg[Leg.REAR])
         if self.mode.control.momentum_speed is not before.control.momentum_speed:
-            observer.read_speed(self.mode.data)
+            observer.read_speed()
         if leans or (lifted and not stance):
             # In flight no force moves the CoM: its path, and all footholds on it, are certain.
             self.supervisor.follow(self.node, observer.now, self.time)
-            self.path_clock.restart()
         placed = PLACED.get(edge.reset)
         if placed is not None:
             self._touch_down(placed)
@@ -413,7 +398,6 @@ class EmbeddingController:
         cause = Cause.TOUCHDOWN if chooses else Cause.GROUND_HEIGHT
         replan = self.supervisor.replan
         self._enter(replan(cause, self.node, s, self.time, height_error=higher).name)
-        self.path_clock.restart()
 
     def _tilt_axes(self, slope: float, foot: int) -> bool:
         """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
@@ -425,7 +409,7 @@ class EmbeddingController:
         frame.tilt(known, robot.foot_position[foot].copy())
         before[:] = frame.inward(in_world)
         robot.update(*frame.enter(*frame.raw_state))
-        self._read()
+        self.observer.read()
         return True
 
     def _decide(self, section: Section) -> None:
@@ -438,7 +422,7 @@ class EmbeddingController:
             nominal, ended = supervisor.decision.nominal, section.of(s.state)
             if self._turn(section, course, nominal):
                 self.robot.update(*self.frame.enter(*self.frame.raw_state))
-                self._read()
+                self.observer.read()
                 if section is REST:
                     self._face_ahead()
                 reached = ended if section is VLO else None
@@ -453,7 +437,6 @@ class EmbeddingController:
             self._enter(lateral.begin_stride(*stride).name)
         taken = Course() if lateral is None else lateral.taken
         self.courses.append(taken._replace(facing=self.robot.facing))
-        self.path_clock.restart()
 
     def _turn(self, section: Section, course: Course, nominal: bool) -> bool:
         """Turn the axes to where the robot is to go; whether it has to be read again.
@@ -478,20 +461,18 @@ class EmbeddingController:
         if ahead[front] < ahead[rear]:
             self.feet.apply(Reset.SWAP)
             self.observer.stand_on(rear)
-            self.observer.take_roles(self.mode.data)
+            self.observer.take_roles()
 
     def _replan(self) -> None:
         """Plan from here where a touchdown is overdue or the robot has left its path."""
-        s, supervisor, clock = self.observer.now, self.supervisor, self.path_clock
-        deviation = s.state[2] - clock.reference[2]
-        cause = supervisor.surprise(self.node, deviation, clock.time, self.time)
-        node, now = None, self.time
+        s, supervisor, now = self.observer.now, self.supervisor, self.time
+        deviation = s.state[2] - self.references.com[2]
+        along, node = supervisor.phase_time, None
+        cause = supervisor.surprise(self.node, deviation, along, now)
         if self.lateral is not None:
-            node = self.lateral.catch(cause, supervisor, self.mode, s, clock.time, now)
+            node = self.lateral.catch(cause, supervisor, self.mode, s, now)
         if node is None and cause is not None:
-            node = supervisor.replan(cause, self.node, s, now, phase_time=clock.time)
-        if node is None:
-            return
-        self._enter(node.name)
-        self.learners.lean.aim(supervisor.goal)
-        self.path_clock.restart()
+            node = supervisor.replan(cause, self.node, s, now, phase_time=along)
+        if node is not None:
+            self._enter(node.name)
+            self.learners.lean.aim(supervisor.goal)

@@ -47,33 +47,22 @@ class SlopeEstimate:
         self._places: deque[tuple[float, float]] = deque(maxlen=_FOOTHOLDS)
         self.slope = self.last = 0.0
 
-    def begin(self, place: tuple[float, float]) -> None:
-        """Forget an earlier run; a foot stands at a place, x and height [m]."""
-        x, height = place
+    def begin(self, place: tuple[float, float], slope: float = 0.0) -> None:
+        """Forget what was before a foot stands at a place, x and height in the world [m]."""
+        (x, height), away, rise = place, 0.5 * self._length, tan(slope)
         before = range(_FOOTHOLDS - 1, -1, -1)
-        self._places.extend((x - 0.5 * i * self._length, height) for i in before)
-        self.slope = self.last = 0.0
+        self._places.extend((x - i * away, height - i * away * rise) for i in before)
+        self.slope = self.last = slope
 
     def stand(self, rear: tuple[float, float], front: tuple[float, float]) -> None:
-        """Both feet stand where a run begins: as if the ground before had been such.
-
-        ``rear`` and ``front`` are x and height of the feet in the world [m].
-        """
+        """Both feet stand where a run begins: as if the ground before had been such."""
         (x, height), (ahead, above) = rear, front
         slope = atan((above - height) / (ahead - x))
-        if abs(slope) <= LEVEL:
-            return
-        self.slope = self.last = min(max(slope, -STEEPEST), STEEPEST)
-        rise, last = tan(self.slope), self._places[-1]
-        before = range(len(self._places) - 1, -1, -1)
-        away = 0.5 * self._length
-        self._places.extend([(last[0] - i * away, last[1] - i * away * rise) for i in before])
+        if abs(slope) > LEVEL:
+            self.begin(self._places[-1], min(max(slope, -STEEPEST), STEEPEST))
 
     def land(self, place: tuple[float, float], other: tuple[float, float]) -> None:
-        """A foot has landed at a place, x and height in the world [m].
-
-        ``other`` is that of the other foot, which may have slid off an edge since it landed.
-        """
+        """A foot has landed at a place; the other one may have slid off an edge since it landed."""
         (x, height), (before, below) = place, other
         if abs(x - before) > _SHORTEST * self._length:
             last = atan((height - below) / (x - before))
@@ -92,14 +81,12 @@ class SlopeEstimate:
 
 
 _BASE = 2  # the first coordinates are the base's place
-_F, _I = np.float64, np.int64
-
+_F = np.float64
 FRAME = np.dtype(
     [
         ("angle", _F),  # of the ground, uphill positive [rad]
         ("turn", _F, (_BASE, _BASE)),  # vectors of the world into axes that lean as it does
         ("shift", _F, (_BASE,)),  # of places, once they are turned [m]
-        ("level", _I),  # whether those are the world's axes
         ("on", _F),  # 1; -1 if these axes' x points the other way than theirs
     ],
     align=True,
@@ -110,10 +97,7 @@ FRAME = np.dtype(
 @compiled
 def to_world(frame: Any, x: float, y: float, out: Array) -> None:
     """Write a place of the frame's axes in the world's, (2,) [m]; ``frame`` is of ``FRAME``."""
-    if frame.level:
-        out[0], out[1] = frame.on * x, y
-    else:
-        vector_to_world(frame, x - frame.on * frame.shift[0], y - frame.shift[1], out)
+    vector_to_world(frame, x - frame.on * frame.shift[0], y - frame.shift[1], out)
 
 
 @compiled
@@ -127,11 +111,12 @@ def vector_to_world(frame: Any, x: float, y: float, out: Array) -> None:
 class SlopeFrame:
     """Turns states into axes that lean with the ground, and results back into the world's.
 
-    The robot's gravity is turned as well; a free robot stays in the world's axes. ``angle`` is the
-    ground's, uphill positive [rad]; ``data`` (1,) are of ``FRAME``. The axes' x points where a
-    planar robot goes. Of its state only the sagittal terms are turned round for that, by its model
-    (``facing``), whose coordinates stay those of a trunk that faces uphill or downhill as it does.
-    ``raw_state`` is q and v in the world, as they entered last.
+    The robot's gravity is turned as well; a floating-base robot stays in the world's axes. ``data``
+    (1,) are of ``FRAME``, ``angle`` is the ground's, uphill positive [rad]. The axes' x points
+    where a planar robot goes. Of its state only the sagittal terms are turned round for that, by
+    its model (``facing``), whose coordinates stay those of a trunk that faces uphill or downhill as
+    it does. ``raw_state`` is q and v in the world, as they entered last. ``turns``: the robot's
+    kind can be looked at in other axes; ``of_world``: its terms are in the world's.
     """
 
     raw_state: tuple[Array, Array]
@@ -139,54 +124,40 @@ class SlopeFrame:
     def __init__(self, robot: Biped, data: Any) -> None:
         self._robot, self.data = robot, data
         self._planar = robot if isinstance(robot, PlanarBiped) else None
+        self.turns = self._planar is not None
         self._turn: Array = data["turn"][0]
         self._shift: Array = data["shift"][0]
         self.reset()
 
     def reset(self) -> None:
         """Back to the world's axes."""
-        self._on = self.data["on"][0] = 1.0
-        self._take(0.0, np.eye(_BASE), np.zeros(_BASE))
+        self._take(0.0, np.eye(_BASE), np.zeros(_BASE), on=1.0)
         if self._planar is not None:
             self._planar.facing = 0.0
             self._planar.turn_gravity(0.0)
 
-    def _take(self, angle: float, turn: Array, shift: Array) -> None:
-        """Take other axes."""
+    def _take(self, angle: float, turn: Array, shift: Array, on: float) -> None:
         self.angle = self.data["angle"][0] = angle
-        self._turn[:], self._shift[:] = turn, shift
-        self._level = self.data["level"][0] = angle == 0.0 and not shift.any()
+        self._turn[:], self._shift[:], self.data["on"] = turn, shift, on
+        self._along = np.array([on, 1.0])  # vectors with x as these axes', or the other way
+        self.of_world = angle == 0.0 and on == 1.0
+        self._level = angle == 0.0 and not shift.any()
 
     def turn_round(self) -> None:
         """Let x point the other way; takes effect at the robot's next update."""
         assert self._planar is not None
         self._planar.facing = 0.0 if self._planar.facing else pi
-        self._on = self.data["on"][0] = onward(self._planar.facing)
-        self.angle = self.data["angle"][0] = -self.angle
-
-    @property
-    def of_world(self) -> bool:
-        """True if the robot's terms are in the world's axes."""
-        return self.angle == 0.0 and self._on == 1.0
-
-    @property
-    def turns(self) -> bool:
-        """True if the robot's kind can be looked at in other axes."""
-        return self._planar is not None
+        self._take(-self.angle, self._turn, self._shift, onward(self._planar.facing))
 
     def tilt(self, angle: float, place: Array) -> None:
-        """Take the axes of an angle of the ground [rad].
-
-        ``place`` (2,) is a point in the present axes that keeps its coordinates [m].
-        """
+        """Take the axes of an angle of the ground [rad]; ``place`` (2,) keeps its coordinates."""
         if self._planar is None or angle == self.angle:
             return
-        fixed = self.world(place)
-        rises = self._on * angle
-        c, s = cos(rises), sin(rises)
+        fixed, on = self.world(place), float(self._along[0])
+        c, s = cos(on * angle), sin(on * angle)
         turn = np.array([[c, s], [-s, c]])
-        self._take(angle, turn, self._onward(place) - turn @ fixed)
-        self._planar.turn_gravity(rises)
+        self._take(angle, turn, place * self._along - turn @ fixed, on)
+        self._planar.turn_gravity(on * angle)
 
     def enter(self, q: Array, v: Array) -> tuple[Array, Array]:
         """q (nq,) and v (nv,) for the model, of the world's; the given arrays stay as they are."""
@@ -195,7 +166,7 @@ class SlopeFrame:
             return q, v
         inside, speed = q.copy(), v.copy()
         inside[:_BASE] = self._turn @ q[:_BASE] + self._shift
-        inside[_BASE] += self._on * self.angle
+        inside[_BASE] += self._along[0] * self.angle
         speed[:_BASE] = self._turn @ v[:_BASE]
         return inside, speed
 
@@ -205,22 +176,17 @@ class SlopeFrame:
         outside[:_BASE] = acceleration[:_BASE] @ self._turn
         return outside
 
-    def _onward(self, vector: Array) -> Array:
-        """(..., 2) vectors with x the other way, if these axes' x is."""
-        return vector if self._on == 1.0 else vector * (self._on, 1.0)
-
     def inward(self, vector: Array) -> Array:
         """(..., 2) vectors in these axes, from the world's."""
-        return vector if self.of_world else self._onward(vector @ self._turn.T)
-
-    def world(self, place: Array) -> Array:
-        """(..., 2) places in the world, from these axes [m]."""
-        place = self._onward(place)
-        return place if self._level else (place - self._shift) @ self._turn
+        return vector if self.of_world else (vector @ self._turn.T) * self._along
 
     def outward(self, vector: Array) -> Array:
         """(..., 2) vectors in the world's axes, from these."""
-        return vector if self.of_world else self._onward(vector) @ self._turn
+        return vector if self.of_world else (vector * self._along) @ self._turn
+
+    def world(self, place: Array) -> Array:
+        """(..., 2) places in the world, from these axes [m]."""
+        return (place * self._along - self._shift) @ self._turn
 
     def foothold(self, foot: int) -> tuple[float, float]:
         """x and height of a foot in the world [m]."""

@@ -8,8 +8,8 @@ from typing import Annotated, Any, ClassVar
 
 from template_control.checks.ranges import Range
 from template_control.embedding.contacts import ContactOptions
-from template_control.embedding.learners.friction import FrictionOptions
-from template_control.embedding.learners.lean import LeanOptions
+from template_control.embedding.friction import FrictionOptions
+from template_control.embedding.lean import LeanOptions
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.phases import PHASES, PhaseControl, Phases
 from template_control.embedding.rollout import ReplanOptions
@@ -102,11 +102,8 @@ class EmbeddingOptions(QpOptions):
 
 def _with_numbers(task: Task, numbers: Mapping[str, Any], where: str) -> Task:
     """A task with some of its numbers replaced."""
-    known: list[str] = (
-        [f.name for f in fields(task) if f.name not in ("leg", "contact")]
-        if is_dataclass(task)
-        else []
-    )
+    names: list[str] = [f.name for f in fields(task)] if is_dataclass(task) else []
+    known = [name for name in names if name not in ("leg", "contact")]
     for name in numbers:
         if name not in known:
             near = meant(name, known)

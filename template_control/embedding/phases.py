@@ -120,11 +120,8 @@ def running_phases(
 ) -> dict[Phase | str, PhaseControl]:
     """Entries of a run, and of the strides between walking and running.
 
-    Args:
-        flight: tasks in flight.
-        stance: control of a run's stances; its swings begin in flight.
-        double: control of the double stance that leads into a run.
-        hop: control of a hop's stances; None: as a run's.
+    By the tasks in flight, the control of a run's stances, whose swings begin in flight, of the
+    double stance that leads into a run, and of a hop's stances; None: as a run's.
     """
     landed = replace(stance, replan_at_touchdown=True)
     # A CoM that hardly moves forward shows no time by its direction.
@@ -156,11 +153,8 @@ def standing_phases(
 ) -> dict[Phase | str, PhaseControl]:
     """Entries of a stand, and of the strides to it, from it, and between two speeds of a walk.
 
-    Args:
-        standing: control of both feet on the ground.
-        stepping: control of the single stance of a step from a stand.
-        unloading: time over which a foot gives up its load before it lifts off [s]; 0: its load is
-            the template's.
+    By the control of both feet on the ground, and of the single stance of a step from a stand;
+    ``unloading`` is that of :class:`PhaseControl`.
     """
     resting = replace(standing, estimate_load=False)
     lifting = replace(resting, unload_legs=(Leg.REAR,), unloading=unloading)
@@ -184,9 +178,7 @@ PHASES: Phases = {
         (PostureTask(0.01), FootTask(Leg.REAR), FootTask(Leg.FRONT)), _RUNNING_STANCE, _UNTRIMMED
     ),
     Phase.SS: _SINGLE_STANCE,
-    Phase.DS: PhaseControl(
-        tasks=(ComTask((1.0, 3.0)), PostureTask()), unload_legs=(Leg.REAR,), trim_momentum=True
-    ),
+    Phase.DS: replace(_UNTRIMMED, trim_momentum=True),
     "SS_av^wp": replace(_SINGLE_STANCE, rolling_contact=True),
     "DS_sc^wp": replace(_UNTRIMMED, rolling_contact=True, use_pre_impact_velocity=True),
     "DS_sd^wp": replace(_UNTRIMMED, rolling_contact=True),
@@ -198,11 +190,10 @@ PHASES: Phases = {
 
 def phase_control(phases: Phases, node: Node) -> PhaseControl:
     """The entry of a node; a ParameterError if the table has none for it."""
-    if node.name in phases:
-        return phases[node.name]
-    if node.phase not in phases:
+    found = phases.get(node.name) or phases.get(node.phase)
+    if found is None:
         raise ParameterError(
             f"no entry of the phases serves node {node.name}: give one for it or for"
             f" Phase.{node.phase.name}"
         )
-    return phases[node.phase]
+    return found

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.planners.planner import (
     Cause,
     Context,
@@ -30,7 +29,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome
 from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import Prior, StrideEnd, solve_stride
 from template_control.slip.dynamics.stride import Stride
-from template_control.slip.gaits.gait import Gait
+from template_control.slip.gaits.gait import Gait, uncontrolled
 from template_control.slip.maps.section import REST, section_of
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal

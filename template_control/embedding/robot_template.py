@@ -1,7 +1,11 @@
-"""The template of a robot, the gaits and speeds it walks, the apexes at which its knees can run."""
+"""The template of a robot, and what the robot can follow: gaits, speeds, apexes, scenarios.
+
+What is found of a robot overwrites the last update of its model.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import radians
 
 import numpy as np
@@ -10,25 +14,35 @@ from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
 from template_control.embedding.free.options import SOLE_STAND
+from template_control.embedding.planners.gait_table import STATE, gait_table, row_at
+from template_control.embedding.planners.running import AGILE
 from template_control.embedding.standing.curves import StandingOptions
-from template_control.errors import GaitError
+from template_control.errors import GaitError, ScenarioError
 from template_control.robot.biped import Biped
 from template_control.robot.terms import UP
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Event, Slot
+from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.family_search import stance_figures
 from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy, with_push_off
 from template_control.slip.gaits.running_gait import (
     RunningGait,
     running_gait,
+    running_speeds,
     suited_height,
 )
-from template_control.slip.gaits.walking_by_speed import gait_for_speed, walking_by_speed
+from template_control.slip.gaits.walking_by_speed import (
+    family_speeds,
+    gait_for_speed,
+    speed_range,
+    walking_by_speed,
+)
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import REFERENCE, Scale
+from template_control.slip.scenario.scenario import STAND, Scenario
+from template_control.slip.scenario.scenario_route import ScenarioRoute
+from template_control.slip.similarity import REFERENCE, Scale, scaled
 from template_control.whole_body.solver import SOLE_SHARE
 
 _TOUCHDOWN = float(np.radians(66.0))
@@ -69,6 +83,9 @@ _EVERY = 3  # link of the family's chains is looked at
 _ROUNDING = 1e-6  # of a centimetre per second
 # Of the quintic that a foot follows, over its length and duration.
 _QUINTIC_SPEED, _QUINTIC_ACCELERATION = 1.875, 10.0 / float(np.sqrt(3.0))
+_RANGES = {"walk": speed_range, "run": running_speeds}
+_STRIDE = 0.7  # of sqrt(l0 / g): the duration of a fast running stride
+_WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
 @checked
@@ -124,10 +141,7 @@ def template_for(robot: Biped) -> SlipParameters:
 
 
 def _above_hips(robot: Biped) -> float:
-    """Height of the CoM over the hips, and of the ankles over the ground, with straight legs [m].
-
-    The robot is left updated so.
-    """
+    """Height of the CoM over the hips, and of the ankles over ground, with straight legs [m]."""
     q = robot.neutral()
     robot.update(q, np.zeros(robot.nv))
     return float(robot.com[1] - robot.hip_height(q)) + robot.ankle_height
@@ -206,7 +220,7 @@ def startable_slopes(robot: Biped) -> tuple[float, float]:
     """Steepest ground, downhill and uphill, on which a robot sets off from a stand [rad].
 
     The template's legs weigh nothing, and its body does not turn: the heavier a robot's legs and
-    the larger its inertia, the gentler the slope. The robot's last update is overwritten.
+    the larger its inertia, the gentler the slope.
     """
     gait = default_gait(robot)
     p = gait.parameters
@@ -218,11 +232,10 @@ def startable_slopes(robot: Biped) -> tuple[float, float]:
 
 
 def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
-    """Speed and torque of the legs' swing, estimated with a straight leg that follows the quintic.
+    """Largest difference that the swing makes between the speeds of CoM and template [m/s].
 
-    The robot was last updated with straight legs, as :func:`template_for` leaves it. Returns the
-    largest difference that the swing makes between the speeds of CoM and template [m/s], and the
-    largest hip torque over its limit.
+    And the largest hip torque over its limit, estimated with a straight leg that follows the
+    quintic. The robot was last updated with straight legs, as :func:`template_for` leaves it.
     """
     p = gait.parameters
     stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
@@ -249,7 +262,7 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
     """Torque that a knee needs at the bottom of a stance, estimated [N m].
 
     A share of the template's leg force times the distance of a knee from the line between hip and
-    foot, with a thigh as long as the shank. The robot's last update is overwritten.
+    foot, with a thigh as long as the shank.
     """
     above_hip, leg = _above_hips(robot), _shortest_leg(gait)
     straight = 0.5 * robot.leg_length
@@ -266,27 +279,13 @@ def _shortest_leg(gait: RunningGait) -> float:
     return float(result[REAR_BOTTOM])
 
 
-def _run_of(robot: Biped) -> tuple[float, float]:
-    """Speed and height at apex of a moderate run [m/s, m]."""
-    p = template_for(robot)
-    return _RUN * p.speed_unit, suited_height(_RUN) * p.rest_length
-
-
 def can_stand(robot: Biped) -> bool:
-    """True if a robot can stand: in its plane, or on feet that are no points.
-
-    Args:
-        robot: of either kind.
-    """
+    """True if a robot can stand: in its plane, or on feet that are no points."""
     return robot.directions <= UP or bool(robot.half_length)
 
 
 def standing_options(robot: Biped) -> StandingOptions:
-    """Options of a robot's stand, for the reference template; the height is the library's.
-
-    Args:
-        robot: its last update is overwritten.
-    """
+    """Options of a robot's stand, for the reference template; the height is the library's."""
     if not robot.half_length:
         return StandingOptions()
     length = Scale.of(template_for(robot)).length
@@ -300,19 +299,19 @@ def standing_options(robot: Biped) -> StandingOptions:
 
 
 def can_run(robot: Biped) -> bool:
-    """True if a robot runs: on points, with light legs, and knees that bear it.
-
-    Its last update is overwritten.
-    """
+    """True if a robot runs: on points, with light legs, and knees that bear it."""
     legs = sum(map(len, robot.groups)) * robot.leg_mass / robot.mass
-    return not robot.patches and legs < _HEAVY and _bears(robot, *_run_of(robot), 1.0)
+    if robot.patches or legs >= _HEAVY:
+        return False
+    p = template_for(robot)
+    return _bears(robot, _RUN * p.speed_unit, suited_height(_RUN) * p.rest_length, 1.0)
 
 
 def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:
     """Check that a robot can run with an apex of dx/dt ``speed`` [m/s] and y ``height`` [m].
 
-    Its last update is overwritten; ``torque_scale`` is the share of the URDF's torque limits that
-    may be used. A GaitError names the heights that can be had, or says that no gait has this speed.
+    A GaitError names the heights that can be had with the share ``torque_scale`` of the URDF's
+    torque limits, or says that no gait has this speed.
     """
     if _bears(robot, speed, height, torque_scale):
         return
@@ -335,3 +334,86 @@ def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bo
     limit = torque_scale * min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
     folded = _shortest_leg(gait) < _SHORTEST * p.rest_length
     return not folded and knee_torque(robot, gait) <= _BEARABLE * limit
+
+
+@checked
+def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) -> ScenarioRoute:
+    """The scenario on the robot's own template.
+
+    Args:
+        robot: its last update is overwritten.
+        scenario: speeds in m/s, as they are; its heights are scaled with l0.
+        push_off: whether its walk has the gaits of the family by speed, in steps with push-off,
+            and their heights at VLO; None: wherever it may. Its planner then takes the nearest
+            speed where a segment wants what cannot be had.
+
+    Raises:
+        ScenarioError: if a segment stands, and the robot cannot; if the start, or a segment of
+            another walk, wants a speed that no gait of the robot has, or a segment a change of
+            speed that is beyond a stride's reach.
+    """
+    if scenario.stands and not can_stand(robot):
+        number = next(i for i, s in enumerate(scenario.segments, 1) if s.gait == STAND)
+        raise ScenarioError(
+            f"segment {number} stands: {robot.name} has a floating base and cannot stand on two"
+            " feet that are points; leave the stands out, or take a robot with four legs"
+        )
+    own = scenario.on(template_for(robot))
+    p = own.parameters
+    unit = p.speed_unit
+    bears = robot.half_length > 0.0
+    may = own.has_any_speed(bears)
+    if push_off and not may:
+        raise ScenarioError(
+            "the scenario does more than walk: its walk has no push-off; leave planner ahead out"
+        )
+    push_off = may if push_off is None else push_off
+    if not push_off:
+        _check_speeds(robot, own)
+        _check_accelerations(robot, own)
+    slowest, fastest = (family_speeds if push_off else speed_range)(p)
+    moves = own.segments[0].gait in _RANGES
+    if moves and not slowest <= own.start[0] <= fastest:
+        raise ScenarioError(
+            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from"
+            f" {inward(slowest, fastest)} m/s"
+        )
+    return ScenarioRoute(
+        own,
+        lambda speed: suited_height(speed / unit) * p.rest_length,
+        vlo_height=_family_height(p) if push_off else None,
+        walks=StrideKind.WALK_PUSH_OFF if push_off else StrideKind.WALK,
+        bears=bears,
+    )
+
+
+def _family_height(p: SlipParameters) -> Callable[[float], float]:
+    table = gait_table(p)
+    return lambda speed: float(row_at(table, speed)[STATE + 1])
+
+
+def _check_speeds(robot: Biped, own: Scenario) -> None:
+    """Refuse speeds that no gait has."""
+    for number, segment in enumerate(own.segments, 1):
+        if segment.gait not in _RANGES:
+            continue
+        slowest, fastest = _RANGES[segment.gait](own.parameters)
+        for speed in (segment.speed, segment.until_speed):
+            if speed is not None and not slowest <= speed <= fastest:
+                raise ScenarioError(
+                    f"segment {number} wants to {segment.gait} at {speed:g} m/s:"
+                    f" {robot.name} can {segment.gait} from {inward(slowest, fastest)} m/s"
+                    f" {_WHERE[segment.gait]}"
+                )
+
+
+def _check_accelerations(robot: Biped, own: Scenario) -> None:
+    """Refuse what no stride can do, however strong the motors: they bound it further."""
+    p = own.parameters
+    most = scaled(AGILE, Scale.of(p)).pace / (_STRIDE * float(np.sqrt(p.rest_length / p.gravity)))
+    for number, segment in enumerate(own.segments, 1):
+        if abs(segment.acceleration) > most:
+            raise ScenarioError(
+                f"segment {number} wants {segment.acceleration:g} m/s^2: a stride of {robot.name}"
+                f" changes its speed by at most {most:.2g} m/s^2"
+            )

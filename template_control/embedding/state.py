@@ -22,26 +22,21 @@ from template_control.structured import Number
 
 @compiled
 def unrolled(lowest: float, state: Array, radius: float) -> float:
-    """x of the template's toe [m] by a rolling foot's lowest point, as the CoM is over it.
+    """x of the template's toe [m] by x of a rolling foot's lowest point, and the CoM's state (4,).
 
     That point moves on by the radius times the angle that the leg turns by. So the phase would go
-    on more slowly than the CoM, and the step would end later and slower than planned. ``lowest`` is
-    x of the foot's lowest point [m], ``state`` (4,) x, y, dx/dt, dy/dt of the CoM.
+    on more slowly than the CoM, and the step would end later and slower than planned.
     """
     return lowest - radius * np.arctan2(state[0] - lowest, state[1])
 
 
 @compiled
 def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
-    """x of the lowest point of a foot at landing [m] whose template's toe is to be at ``toe`` [m].
-
-    The inverse of :func:`unrolled`; the touchdown angle is from the ground to the leg [rad].
-    """
+    """Inverse of :func:`unrolled` at landing, with the touchdown angle from the ground [rad]."""
     return toe - radius * (0.5 * np.pi - touchdown_angle)
 
 
-_F, _I = np.float64, np.int64
-
+_F = np.float64
 SENSED = np.dtype(
     [
         ("state", _F, (4,)),  # x, y, dx/dt, dy/dt of the CoM, y over the template's ground
@@ -59,8 +54,7 @@ SENSED = np.dtype(
 def read_state(s: Any, f: Any, r: Any, mode: Any) -> bool:
     """Read the state of this tick; True if the forward speed is finite.
 
-    ``s``, of ``SENSED``, is overwritten; ``f`` is of :data:`~.swing.FEET`, ``r`` of ``ROBOT_DATA``,
-    ``mode`` of :data:`~.modes.MODE`.
+    ``s`` is of ``SENSED``, ``f`` of ``FEET``, ``r`` of ``ROBOT_DATA``, ``mode`` of ``MODE``.
     """
     if mode.stances > 0:
         s.ground = r.foot_position[f.landed, UP]
@@ -72,7 +66,7 @@ def read_state(s: Any, f: Any, r: Any, mode: Any) -> bool:
 
 @compiled
 def read_speed(s: Any, r: Any, mode: Any) -> bool:
-    """Read the forward speed as the phase has it; as :func:`read_state`.
+    """Read the forward speed as the phase has it; True if it is finite.
 
     The swing leg's angular momentum makes dx/dt of the CoM swing within a step while the momentum
     about the foot, which is what the template predicts, does not.
@@ -85,7 +79,7 @@ def read_speed(s: Any, r: Any, mode: Any) -> bool:
 
 @compiled
 def read_toes(s: Any, f: Any, r: Any, mode: Any) -> None:
-    """Read the template's toes; arguments as for :func:`read_state`."""
+    """Read x of the template's toes."""
     for leg in range(2):
         toe = r.foot_position[f.roles[leg], 0]
         s.toes[leg] = unrolled(toe, s.state, r.foot_radius) if mode.rolling_contact else toe
@@ -94,74 +88,60 @@ def read_toes(s: Any, f: Any, r: Any, mode: Any) -> None:
 
 @dataclass
 class TemplateState:
-    """State of the robot in the template's terms; overwritten at every tick.
+    """State of the robot in the template's terms; overwritten at every tick."""
 
-    Attributes:
-        state: (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s], y over the template's ground. Where the
-            phase says so, dx/dt includes the angular momentum about the CoM as if it moved the CoM,
-            so that m y dx/dt - m x dy/dt is the robot's angular momentum about its stance foot.
-        toes: (2,) x of the rear and the front foot [m].
-        feet: the foot that is the rear leg's, and the front leg's.
-        acceleration: (2,) wanted of the CoM at the last tick [m/s^2]: what is planned anew goes on
-            with it.
-    """
-
+    # (4,) x, y, dx/dt, dy/dt of the CoM [m, m/s], y over the template's ground. Where the phase
+    # says so, dx/dt includes the angular momentum about the CoM as if it moved the CoM, so that
+    # m y dx/dt - m x dy/dt is the robot's angular momentum about its stance foot.
     state: Array = field(default_factory=lambda: np.zeros(4))
-    toes: Array = field(default_factory=lambda: np.zeros(2))
-    feet: tuple[int, int] = (0, 1)
+    toes: Array = field(default_factory=lambda: np.zeros(2))  # (2,) x of rear and front foot [m]
+    feet: tuple[int, int] = (0, 1)  # the foot that is the rear leg's, and the front leg's
+    # (2,) wanted of the CoM at the last tick [m/s^2]: what is planned anew goes on with it
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
 
 
 class StateObserver:
     """Observer of the robot's state on the template's ground, that of the foot that landed last.
 
-    Every tick updates the robot's model. Others write ``acceleration`` (2,) wanted of the CoM
-    [m/s^2]; ``data`` (1,) are of ``SENSED``. ``now`` was read last; ``ground`` is the height of the
-    template's ground [m], ``pre_impact_velocity`` (2,) dx/dt and dy/dt of this tick if nothing has
-    hit the robot since the last one.
+    Every tick updates the robot's model, and others write ``acceleration`` (2,), wanted of the CoM
+    [m/s^2], and ``mode`` (1,), of ``MODE``. ``data`` (1,), of ``SENSED``, explains the other
+    numbers; ``now`` was read last.
     """
 
     ground = Number("ground")
     _rear_shift = Number("rear_shift")
 
-    def __init__(self, robot: Biped, feet: Feet, acceleration: Array, data: Any) -> None:
+    def __init__(self, robot: Biped, feet: Feet, acceleration: Array, data: Any, mode: Any) -> None:
         self._robot, self._feet, self.data = robot, feet, data
-        self.now = TemplateState(
-            state=self.data["state"][0],
-            toes=self.data["toes"][0],
-            acceleration=acceleration,
-        )
-        self.pre_impact_velocity: Array = self.data["pre_impact_velocity"][0]
-        self._terms = self.data[0], feet.data[0], robot.data[0]
+        self.now = TemplateState(data["state"][0], data["toes"][0], acceleration=acceleration)
+        self.pre_impact_velocity: Array = data["pre_impact_velocity"][0]
+        self._terms = data[0], feet.data[0], robot.data[0], mode[0]
 
     def begin(self, stands: bool) -> None:
         """Begin a run; where no foot stands, the ground is at height 0."""
         self.now.feet = self._feet.foot_of_leg
         self.ground = self._height(self._feet.landed) if stands else 0.0
 
-    def read(self, mode: Any) -> None:
+    def read(self) -> None:
         """Read the state of this tick; a DivergedError if the speed is not finite."""
-        if not read_state(*self._terms, mode):
+        if not read_state(*self._terms):
             raise self.diverged()
 
-    def read_speed(self, mode: Any) -> None:
+    def read_speed(self) -> None:
         """Read the forward speed as the phase has it; see :meth:`read`."""
-        sensed, _, robot = self._terms
+        sensed, _, robot, mode = self._terms
         if not read_speed(sensed, robot, mode):
             raise self.diverged()
 
     def diverged(self) -> DivergedError:
-        """The error of a speed that is not finite.
-
-        The robot's own state is, but for its height over the foot.
-        """
+        """The error of a forward speed that is not finite, as the height over the foot may be 0."""
         return DivergedError(f"the forward speed of {self._robot.name} is not finite")
 
-    def take_roles(self, mode: Any) -> None:
+    def take_roles(self) -> None:
         """The feet have changed their roles, or one of them has lifted off."""
         self._rear_shift = 0.0
         self.now.feet = self._feet.foot_of_leg
-        read_toes(*self._terms, mode)
+        read_toes(*self._terms)
 
     def stand_on(self, foot: int) -> None:
         """Put the ground under a foot: the one that landed last has lifted off."""
@@ -211,6 +191,11 @@ class Snapshot:
         template_com, template_velocity: (2,) of the template at the robot's phase [m, m/s].
         template_force: (2, 2) its leg forces, rear and front [N].
         swing_reference: (2, 2) position of each foot's reference, NaN where it has none [m].
+        sway: (2,) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
+            angular momentum about the CoM where the phase's forward speed has it [m, m/s]. Zero in
+            the plane.
+        side_reference: (2,) y of each foot's reference, NaN where it has none [m]; zero in the
+            plane.
     """
 
     time: float
@@ -222,33 +207,17 @@ class Snapshot:
     template_velocity: Array
     template_force: Array
     swing_reference: Array
-
-
-@dataclass(frozen=True)
-class FloatingSnapshot(Snapshot):
-    """Snapshot of a floating-base robot's controller.
-
-    Attributes:
-        sway: (2,) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
-            angular momentum about the CoM where the phase's forward speed has it [m, m/s].
-        side_reference: (2,) y of each foot's reference, NaN where it has none [m].
-    """
-
     sway: Array
     side_reference: Array
 
 
 @dataclass(frozen=True)
 class EstimatorState:
-    """Estimates of the controller's learners at a section.
+    """Estimates of the controller's learners at a section."""
 
-    ``load`` is the load factor, ``trim`` the momentum trim [m/s^2], ``lean`` what the trunk's
-    reference adds to the wanted mean pitch [rad].
-    """
-
-    load: float
-    trim: float
-    lean: float
+    load: float  # the load factor
+    trim: float  # the momentum trim [m/s^2]
+    lean: float  # what the trunk's reference adds to the wanted mean pitch [rad]
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,21 @@ from __future__ import annotations
 from collections.abc import Set
 from dataclasses import replace
 from math import hypot
+from typing import Any
 
 import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.fitting import answered_or_none
-from template_control.embedding.com_path import Landing, TemplatePath, join
+from template_control.embedding.com_path import (
+    LEADS_NOWHERE,
+    OVERDUE,
+    PATH,
+    STRAYED,
+    TemplatePath,
+    join,
+    plan_is_due,
+)
 from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.planners.planner import Cause, Decision, Planner, Planners
 from template_control.embedding.recovery import Recovery
@@ -31,13 +40,18 @@ from template_control.embedding.standing.planners import StepPlanner
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
-from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Slot, StrideKind
+from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route, StrideGoal
+from template_control.structured import Number
 
-_TOUCHDOWN = int(Event.TOUCHDOWN)
+_CAUSES = {
+    OVERDUE: Cause.OVERDUE,
+    STRAYED: Cause.DEVIATION,
+    LEADS_NOWHERE: Cause.NO_FUTURE,
+}
 _BARELY_BEYOND, _JUST_BEYOND = 1.002, 1.01
 """Lengths of a leg over l0 up to which a path that begins lets it go at once: any, and one that
 extends slowly. One further out that extends fast is being pushed off: where it was let go
@@ -52,22 +66,21 @@ class StrideSupervisor:
     """Supervisor of a stride: decision at its section, path, and new plans on the way.
 
     In ``curved`` nodes the planner's curve is followed, not the template's springs; ``recovery`` is
-    what a walk that cannot go on breaks into, None: nothing.
+    what a walk that cannot go on breaks into, None: nothing. ``data`` (1,), of ``PATH``, is where
+    ticks follow the path.
 
     Attributes:
         goal, decision: of the present stride, the last ones.
         log: one report for each stride that has ended.
         path: the template's, from the last plan on.
-        event_times: time on the path of the next occurrence of each :class:`Event` [s], else inf.
         feet: that were the rear and the front leg's where the path starts.
-        without_touchdown: the swing foot is overdue, and the path goes on without it.
         arrived: the route has ended.
-        planned_at: when the path began [s].
-        viable: whether the template completes the path's strides, and goes on.
         height_error: of the ground under a foot that has landed, from which on it is unexpected
             [m].
     """
 
+    phase_time, planned_at = Number("time"), Number("planned_at")
+    without_touchdown, _viable = Number("without_touchdown"), Number("viable")
     goal: StrideGoal
     decision: Decision
     path: TemplatePath
@@ -80,22 +93,24 @@ class StrideSupervisor:
         automaton: Automaton = AUTOMATON,
         curved: Set[str] = frozenset(),
         recovery: Recovery | None = None,
+        data: Any = None,
     ) -> None:
-        self.route = route
-        self.planners = planners
-        self.options = options
-        self.automaton = automaton
-        self.curved = curved
+        self.route, self.planners = route, planners
+        self.automaton, self.curved = automaton, curved
         self.parameters: SlipParameters = route.parameters
+        self.data = np.zeros(1, PATH) if data is None else data
+        for name in ("patience", "interval", "speed"):
+            self.data[name] = getattr(options, name)
+        self._body: Array = self.data["body"][0]
+        self._body[0], self._body[3] = self.parameters.mass, self.parameters.rest_length
+        self._event_times: Array = self.data["event_times"][0]
+        self._event_times[:] = np.inf
+        self._viable = True
         self.log: list[SectionReport] = []
-        self.event_times = [np.inf] * NUM_EVENTS
         self.feet = (0, 1)
-        self.without_touchdown = False
         self.arrived = False
         self._begun: SectionReport | None = None  # the present stride, as it was decided first
         self._passed = 0  # so many of the path's events are over
-        self.planned_at = 0.0
-        self.viable = True
         self._recovering = False  # into the present stride
         self._knows_slopes = False  # the present stride's planner
         # Speed at the stride's section less the wanted, and what came on top.
@@ -117,7 +132,7 @@ class StrideSupervisor:
         is no planner for that stride.
         """
         self._planners.reset()
-        self._rollout.set_ground(self.parameters)
+        self._stand_on(self.parameters)
         self.log.clear()
         self._begun = None
         self.arrived = False
@@ -153,11 +168,6 @@ class StrideSupervisor:
         return 0.0 if self._begun is None else self._begun.time
 
     @property
-    def changes_kind(self) -> bool:
-        """True if the present stride is of another kind than the one before."""
-        return bool(self.log) and self.log[-1].goal.stride != self.goal.stride
-
-    @property
     def _along_curve(self) -> bool:
         """True if a curve carries the present stride, at least in part."""
         return self.goal.stride in self._curved_kinds
@@ -170,10 +180,10 @@ class StrideSupervisor:
         estimators: EstimatorState,
         reached: Array | None = None,
     ) -> Node:
-        """At a section: learn from the stride that ended, choose the next one's controls.
+        """At a section: learn from the stride that ended, choose the next one; its first node.
 
         ``estimators`` are for the report. Where the axes have turned at the section, ``reached``
-        (n,) is the state before, from which is learnt. Returns the node that the stride begins in.
+        (n,) is the state before, from which is learnt.
         """
         z = section.of(sensed.state)
         ended = self.reports
@@ -190,7 +200,7 @@ class StrideSupervisor:
         state = sensed.state.copy()
         if start is not z:
             state[:4] = section.state(start, state[0])
-        node = self._follow(node, state, sensed, now)
+        node = self.follow(node, sensed, now, state=state)
         next_to = reached is not None and report.decision.feasible
         if next_to and not self.path.strides[0].completed:
             # It leads on from the section, and does not from the robot, which is next to it.
@@ -200,32 +210,20 @@ class StrideSupervisor:
         return node
 
     def surprise(self, node: Node, deviation: float, phase_time: float, now: float) -> Cause | None:
-        """Cause to plan again, if there is one.
+        """Cause to plan again, if there is one: see :func:`.plan_is_due`.
 
-        OVERDUE: the swing foot should have found the ground by now. DEVIATION: a disturbance has
-        carried the robot away from its path, by ``deviation`` of the forward speed [m/s].
-        NO_FUTURE: the path leads nowhere, and the robot has broken into its stride, no stride went
-        on, or the planner may find another way. ``phase_time`` is along the path [s].
+        Of a path that leads nowhere it is none, unless the robot has broken into its stride, no
+        stride went on, or the planner may find another way.
         """
-        o = self.options
-        if self.without_touchdown:
-            return None
-        late = phase_time > self.event_times[_TOUCHDOWN] + o.patience
-        if late and node.edge(Event.TOUCHDOWN) is not None:
-            return Cause.OVERDUE
-        if now - self.planned_at <= o.interval:
-            return None
-        if abs(deviation) > o.speed and phase_time > o.interval:
+        lands = node.edge(Event.TOUCHDOWN) is not None
+        due = plan_is_due(self.data[0], lands, deviation, phase_time, now)
+        if due == STRAYED:
             self._speed_excess += deviation
-            return Cause.DEVIATION
-        stuck = not self.viable and (self._recovering or self._retries())
-        return Cause.NO_FUTURE if stuck else None
-
-    def _retries(self) -> bool:
-        """True if the planner may find another way. One along a curve is left to it."""
-        if self._along_curve:
-            return False
-        return not self.decision.feasible or self.planner.retries
+        if due == LEADS_NOWHERE and not self._recovering:
+            retries = not self.decision.feasible or self.planner.retries
+            if self._along_curve or not retries:  # a curve is left to its planner
+                return None
+        return _CAUSES.get(due)
 
     def replan(
         self,
@@ -254,9 +252,9 @@ class StrideSupervisor:
             return self.follow(node, sensed, now)
         decision = rule.choose(self._rollout, s)
         self.set_decision(decision)
-        node = self.follow(node, sensed, now, rule.angle_drop)
+        node = self.follow(node, sensed, now, angle_drop=rule.angle_drop)
         lasts = not s.whole or decision is None or decision.lasting
-        if not rule.recovers or (lasts and self.viable):
+        if not rule.recovers or (lasts and self._viable):
             return node
         return self._recover(self._situation(node, sensed), now) or node
 
@@ -267,11 +265,7 @@ class StrideSupervisor:
         return Situation(node, sensed, self.goal, self.decision, whole, to_go)
 
     def _recover(self, s: Situation, now: float) -> Node | None:
-        """Break into another stride where the present one cannot go on; the robot's node in it.
-
-        The path starts there. None where there is no other stride, or the template does not
-        complete it.
-        """
+        """Break into another stride, if the template completes one; the robot's node in it."""
         if self._recovery is None:
             return None
         found = find_recovery(self._rollout, s, self._recovery, self._speed_excess)
@@ -303,9 +297,15 @@ class StrideSupervisor:
             # No spring carries along a curve, but in the strides after it.
             assists = (other.assist for other in answers.values() if other is not None)
             ground = replace(ground, assist=next(filter(None, assists), 0.0))
-        if self._rollout.set_ground(ground):
+        if self._stand_on(ground):
             self.set_decision(replace(self.decision, nominal=False))
         return ground.slope
+
+    def _stand_on(self, ground: SlipParameters) -> bool:
+        """Let the template's ground be this one from now on; whether it was another."""
+        changes = self._rollout.set_ground(ground)
+        self._body[1:3], self._body[4] = self.ground.gravity_parts, self.ground.assist
+        return changes
 
     @property
     def ground(self) -> SlipParameters:
@@ -319,21 +319,24 @@ class StrideSupervisor:
         """
         if self._knows_slopes and not self._along_curve:
             choose_assist(self._rollout, self._situation(node, sensed))
+            self._stand_on(self.ground)
 
     def follow(
-        self, node: Node, sensed: TemplateState, now: float, angle_drop: float = 0.0
+        self,
+        node: Node,
+        sensed: TemplateState,
+        now: float,
+        *,
+        state: Array | None = None,
+        angle_drop: float = 0.0,
     ) -> Node:
-        """Template path from here to the touchdown after the next section; the node it begins in.
+        """Follow the template from here to the touchdown after the next section; the node now.
 
-        That is of another stride where a curve led to no rest. ``angle_drop`` is how much lower the
-        touchdown angle is than decided [rad].
+        That is of another stride where a curve led to no rest. ``state`` (4,) is the template's
+        where it is not the robot's; ``angle_drop`` is how much lower the touchdown angle is than
+        decided [rad].
         """
-        return self._follow(node, sensed.state, sensed, now, angle_drop)
-
-    def _follow(
-        self, node: Node, state: Array, sensed: TemplateState, now: float, angle_drop: float = 0.0
-    ) -> Node:
-        u = self.decision.controls
+        u, state = self.decision.controls, sensed.state if state is None else state
         if angle_drop:
             u = u.copy()
             u[Slot.TOUCHDOWN_ANGLE] -= angle_drop
@@ -349,10 +352,7 @@ class StrideSupervisor:
     def catch(
         self, node: Node, step: CatchingStep, sensed: TemplateState, now: float
     ) -> Node | None:
-        """Make a step that catches the robot, which is in ``node``; the node that it begins in.
-
-        None where no planner makes it.
-        """
+        """Make a step that catches the robot, if a planner makes it; the node that it begins in."""
         kind, begins = self.goal.stride, node.name
         if len(node.stance) > 1:
             kind = StrideKind.STEP_FORWARD if step.foot == sensed.feet[0] else StrideKind.STEP_BACK
@@ -370,13 +370,19 @@ class StrideSupervisor:
     def _take(
         self, node: Node, first: Stride, state: Array, sensed: TemplateState, now: float
     ) -> Node:
-        strides, self.viable = self._rollout.strides(node, first, self.goal, now)
+        strides, self._viable = self._rollout.strides(node, first, self.goal, now)
         self.path, self.feet = join(strides, self._rollout.scale.time), sensed.feet
+        gait, data = self.planner.gait, self.data[0]
+        data["time"], data["offset"], data["fresh"] = 0.0, 0.0, 1
+        for foot, landing in zip(self.feet, self.path.landings, strict=True):
+            data["landing_x"][foot], data["landing_time"][foot] = landing
+        data["touchdown_angle"] = self.decision.controls[Slot.TOUCHDOWN_ANGLE]
+        data["step_length"], data["step_duration"] = gait.step_length, gait.step_duration
+        data["toe"], data["planned_at"] = self.path.toes[0], now
         self._look_ahead(0)
         if self._lets_go(node, state, sensed):
             # On the path that leg pulls, which the template's cannot, and comes back to l0 later.
-            self.event_times[Event.REAR_LIFTOFF] = 0.0
-        self.planned_at = now
+            self._event_times[Event.REAR_LIFTOFF] = 0.0
         return node
 
     def _lets_go(self, node: Node, state: Array, sensed: TemplateState) -> bool:
@@ -392,7 +398,7 @@ class StrideSupervisor:
 
     def time_of(self, event: Event) -> float:
         """Time on the path at which ``event`` comes next [s], inf if it does not."""
-        return self.event_times[event]
+        return float(self._event_times[event])
 
     def pass_event(self, event: Event) -> None:
         """The robot has fired ``event``."""
@@ -401,17 +407,8 @@ class StrideSupervisor:
     def _look_ahead(self, passed: int) -> None:
         """So many of the path's events are over: note when each comes next."""
         self._passed = passed
-        self.event_times = self.path.event_times(passed)
-
-    def landing(self, foot: int) -> Landing:
-        """Next touchdown of a foot on the path."""
-        return self.path.landings[self.feet.index(foot)]
-
-    @property
-    def toe(self) -> float:
-        """x of the template's rear toe [m]."""
-        return float(self.path.curve.look[0])
+        self._event_times[:] = self.path.event_times(passed)
 
     def set_rear_toe(self, foot: int) -> None:
         """The template's rear toe is now the one that was this foot's at the start of the path."""
-        self.path.curve.look[0] = self.path.toes[self.feet.index(foot)]
+        self.path.curve.look[0] = self.data["toe"] = self.path.toes[self.feet.index(foot)]

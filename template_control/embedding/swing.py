@@ -102,8 +102,8 @@ FEET = np.dtype(
 def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
     """Advance (position, velocity, acceleration) by ``dt`` [s] along the quintic to its target.
 
-    ``state`` (3,) [m, m/s, m/s^2] is overwritten. ``target`` [m] and ``speed`` [m/s] are those at
-    the quintic's end, ``time`` [s] from now; the acceleration there is 0.
+    ``target`` and ``speed`` are those at the quintic's end, ``time`` [s] from now; the acceleration
+    there is 0.
     """
     p, v, a = state[0], state[1], state[2]
     # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.
@@ -126,9 +126,8 @@ def swing_step(
 ) -> None:
     """Advance a foot's reference by ``dt`` [s] towards its foothold.
 
-    ``f`` is of ``FEET``; ``x``, ``y`` (3,) are position, velocity, acceleration [m, m/s, m/s^2],
-    overwritten; ``foothold`` is x and y of the foothold [m], and the time until the foot is due
-    there [s].
+    ``f`` is of ``FEET``; ``x``, ``y`` (3,) are position, velocity, acceleration [m, m/s, m/s^2];
+    ``foothold`` is its x and y [m], and the time until the foot is due there [s].
     """
     place, ground, to_go = foothold
     horizon, landing_speed, elapsed = f.horizon[foot], f.landing_speed[foot], f.elapsed[foot]
@@ -156,10 +155,7 @@ def swing_step(
 
 @compiled
 def wait(f: Any, foot: int, x: Array, place: float, speed: float) -> None:
-    """Let a foot's reference wait for the foot, at x ``place`` with a ``speed`` [m, m/s].
-
-    ``f`` and ``x`` are as for :func:`swing_step`.
-    """
+    """Let a foot's reference wait for the foot, at x ``place`` with a ``speed`` [m, m/s]."""
     ahead = x[0] - place
     if abs(ahead) > f.lag[foot]:
         x[0] = place + np.copysign(f.lag[foot], ahead)
@@ -172,9 +168,8 @@ def meet_wall(
 ) -> None:
     """Go up along a wall that a foot has met, and stay above it from then on; or down.
 
-    ``at`` (3,) is the foot, forward first and up last [m]; ``aim`` is x of the foothold in the
-    world [m], not finite where there is none, and the time until the foot is due [s]. The rest as
-    for :func:`swing_step`.
+    ``at`` (3,) is the foot, forward first and up last [m]; ``aim`` is x of the foothold [m], not
+    finite where there is none, and the time until the foot is due [s].
     """
     x[0], x[1], x[2] = at[0], 0.0, 0.0
     near = y[1] < 0.0 and abs(aim[0] - at[0]) < f.near[foot]
@@ -189,10 +184,7 @@ def meet_wall(
 
 @compiled
 def drop(f: Any, foot: int, x: Array, y: Array, dt: float) -> None:
-    """Let an overdue foot fall: the ground is lower than was thought.
-
-    Arguments as for :func:`swing_step`.
-    """
+    """Let an overdue foot fall: the ground is lower than was thought."""
     x[1], x[2] = 0.0, 0.0
     y[2] = -f.drop_acceleration[foot]
     y[0] += (y[1] + 0.5 * y[2] * dt) * dt
@@ -205,7 +197,7 @@ def furthest(
 ) -> float:
     """The furthest x that a share of a straight leg's length reaches at a foot's height [m].
 
-    ``hip`` is x and y of the hip [m], ``sideways`` how far the leg leans to a side [m].
+    ``hip`` is its x and y, ``sideways`` how far the leg leans to a side [m].
     """
     below, reach = hip[1] - height, share * leg_length
     return hip[0] + np.sqrt(max(reach * reach - below * below - sideways * sideways, 0.0))
@@ -224,11 +216,10 @@ def level_reach(r: Any, foot: int, height: float) -> tuple[float, float]:
 
 @compiled
 def spread_contacts(f: Any, foot: int, r: Any, yaw: float, duration: float, offset: Array) -> None:
-    """Write where the contacts of a foot in the air are to be, from the foot's reference.
+    """Write where the contacts of a foot in the air are to be, as ``offset`` of ``REFERENCES``.
 
     They stand around their foot as the trunk faces, at ``yaw`` [rad]. How far they were off when
-    the foot lifted fades over half a ``duration`` of a step [s] along a quintic. ``f`` is of
-    ``FEET``, ``r`` of ``ROBOT_DATA``; ``offset`` (n, 3, 3) is that of ``REFERENCES``.
+    the foot lifted fades over half a ``duration`` of a step [s] along a quintic.
     """
     half = 0.5 * duration
     s = min(f.swing_time[foot] / half, 1.0)
@@ -259,11 +250,10 @@ def begin_swing(
     velocity: Array,
     elapsed: float = 0.0,
 ) -> None:
-    """Begin a swing of a shape, which it keeps, at the foot's position and velocity.
+    """Begin a swing of a shape, which it keeps, with the foot's position and velocity (2,).
 
-    ``data`` (1,), of ``FEET``, and ``reference`` (2, 3), x and y in the world, are overwritten;
-    ``position`` (2,) [m], ``velocity`` (2,) [m/s]; ``elapsed`` is since the foot left the ground
-    [s].
+    ``data`` (1,) is of ``FEET``, ``reference`` (2, 3) the foot's x and y, each as for
+    :func:`swing_step`; the foot left the ground ``elapsed`` [s] ago.
     """
     now = data[0]
     for name in _SHAPE:
@@ -275,8 +265,6 @@ def begin_swing(
 
 HIGH_SWING = SwingOptions(clearance=0.06, rise=0.3, descent=0.12, early=0.02)
 """The foot is high while it travels, and comes down nearly vertically."""
-
-
 SOLE_SWING = SwingOptions(lag=0.003)
 """Of a walk on flat feet. At 0.9 m/s G1's hips are at their limits as a swing begins. Where its
 foot, 40 mm behind by then, was caught up with, the centre of pressure went to the heel, and the
@@ -335,9 +323,8 @@ class Swings(NamedTuple):
 class Feet:
     """Roles of the two feet, which the automaton's resets change, and their swings.
 
-    ``reference`` (2, 2, 3) are the swings' references by foot: x and y in the world, each position,
-    velocity, acceleration [m, m/s, m/s^2]. ``data`` (1,) are of ``FEET``. ``swing_time`` (2,) is
-    since each foot lifted off [s].
+    ``reference`` (2, 2, 3) are the swings' references by foot: x and y, each as for
+    :func:`swing_step`. ``data`` (1,), of ``FEET``, explains the other numbers.
     """
 
     def __init__(self, reference: Array, data: Any) -> None:
@@ -368,11 +355,7 @@ class Feet:
         self.landed = rear
 
     def lift(self, foot: int, robot: Biped, shape: SwingOptions, swung: float = 0.0) -> None:
-        """Begin the swing of a foot that leaves the ground, or left it ``swung`` [s] ago.
-
-        ``foot`` is its index in the order of the robot's ``feet``; the swing begins at its position
-        and velocity in the updated model.
-        """
+        """Begin the swing of a foot of the robot, which leaves the ground, or left it ago [s]."""
         self.swing_time[foot] = swung
         now = robot.data[0]
         for contact in robot.groups[foot]:

@@ -7,7 +7,8 @@ measured; :func:`act` moves the references on, and solves the QP where no limit 
 Python sees to events and plans.
 
 The arguments of all of them: ``tick`` is (1,) of ``TICK``, ``data`` (1,) of ``ROBOT_DATA``,
-``references`` (1,) of ``REFERENCES``, ``qp`` (1,) of ``QP_DATA``.
+``references`` (1,) of ``REFERENCES``, ``qp`` (1,) of ``QP_DATA``; ``t``, ``r``, ``want`` and ``p``
+are their one elements.
 """
 
 from __future__ import annotations
@@ -18,22 +19,15 @@ import numpy as np
 
 from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
-from template_control.embedding.com_path import unload_cap
+from template_control.embedding.com_path import KEPT, PATH, move_clock, plan_is_due, unload_cap
 from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
+from template_control.embedding.friction import SLIDES, feel_slides
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
-from template_control.embedding.learners.friction import SLIDES, feel_slides
-from template_control.embedding.learners.lean import LEAN, advance_lean
-from template_control.embedding.learners.momentum import LOAD, observe_load
-from template_control.embedding.modes import (
-    GUARDS,
-    MODE,
-    PATH,
-    first_fired,
-    move_clock,
-    plan_is_due,
-)
+from template_control.embedding.lean import LEAN, advance_lean
+from template_control.embedding.learners import LOAD, observe_load
+from template_control.embedding.modes import GUARDS, MODE, first_fired
 from template_control.embedding.state import SENSED, read_state, rolled
 from template_control.embedding.swing import (
     FEET,
@@ -90,8 +84,7 @@ SNAPSHOT = np.dtype(
     ],
     align=True,
 )
-"""Numbers of a :class:`~.state.FloatingSnapshot`, which explains them; a planar robot's sway is
-zero."""
+"""Numbers of a :class:`~.state.Snapshot`, which explains them."""
 
 QUIET, EVENTFUL, DIVERGED = 0, 1, 2
 """Results of :func:`sense`: nothing to decide; an event, or a plan that is due; no finite state."""
@@ -104,19 +97,12 @@ _SIDE = 1
 
 @compiled
 def sense(
-    tick: Any,
-    data: Any,
-    references: Any,
-    qp: Any,
-    contact: BoolArray,
-    force: Array,
-    dt: float,
+    tick: Any, data: Any, references: Any, qp: Any, contact: BoolArray, force: Array, dt: float
 ) -> int:
     """Take in what was measured, and find out whether anything is to be decided.
 
-    ``tick``, ``data``, ``references``, ``qp``: see the module. ``contact`` (n,) says whether each
-    contact touches the ground, ``force`` (n, 2) is the ground's on each, forward and up [N], or
-    ``NO_FORCE``; ``dt`` is the control period [s].
+    ``contact`` (n,) says whether each contact touches the ground, ``force`` (n, 2) is the ground's
+    on each, forward and up [N], or ``NO_FORCE``; ``dt`` is the control period [s].
     """
     t, r = tick[0], data[0]
     _expect(t, r)
@@ -132,15 +118,16 @@ def sense(
     if not read_state(t.sensed, t.feet, r, t.mode):
         return DIVERGED
     stand(tick, data, references, qp)
-    if fired_edge(tick) >= 0 or t.lateral.leaves:
+    if first_fired(t) >= 0 or t.lateral.leaves:
         return EVENTFUL
-    speed, reference = t.sensed.state[2], references[0].com[2]
-    return EVENTFUL if plan_is_due(t.path, t.mode, speed, reference, t.time) else QUIET
+    lands, deviation = t.mode.next_touchdown_leg >= 0, t.sensed.state[2] - references[0].com[2]
+    due = plan_is_due(t.path, lands, deviation, t.path.time, t.time)
+    return QUIET if due == KEPT else EVENTFUL
 
 
 @compiled
 def stand(tick: Any, data: Any, references: Any, qp: Any) -> None:
-    """Write which contacts the QP has on the ground; arguments: see the module.
+    """Write which contacts the QP has on the ground.
 
     A foot stands on those of its contacts that touch the ground; one none of which does, as its
     sensors say, on all of them, or on none in a phase that settles it.
@@ -180,10 +167,7 @@ def _expect(t: Any, r: Any) -> None:
 
 @compiled
 def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> None:
-    """Let the cones be as narrow as the friction that sliding feet have shown.
-
-    ``tick``, ``data``, ``qp``: see the module; the rest as for :func:`.feel_slides`.
-    """
+    """Let the cones be as narrow as the friction that sliding feet show: see ``feel_slides``."""
     t = tick[0]
     if feel_slides(t.slides, t.contacts.touching, force, data[0].contact_velocity, dt):
         qp[0].friction = t.friction_margin * t.slides.coefficient
@@ -191,30 +175,17 @@ def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> Non
 
 @compiled
 def feel_in_space(tick: Any, data: Any, qp: Any, force: Array, axes: Array, dt: float) -> None:
-    """As :func:`feel_friction`, of forces (n, 3) in the world's axes [N].
-
-    ``axes`` (3, 3) are a floating-base robot's.
-    """
+    """As :func:`feel_friction`, of forces (n, 3) in the world, and a robot's ``axes`` (3, 3)."""
     feel_friction(tick, data, qp, np.dot(force, axes), dt)
 
 
 @compiled
-def fired_edge(tick: Any) -> int:
-    """As :func:`.first_fired`, of a ``tick``."""
-    t = tick[0]
-    return first_fired(t.guards, t.mode, t.path, t.sensed, t.feet, t.contacts)
-
-
-@compiled
 def advance(kept: Any, dt: float) -> None:
-    """Move the references on, write the tasks' rows and the stance.
+    """Move the references on, write the tasks' rows and the stance, for ``dt`` [s].
 
-    Args:
-        kept: :class:`.Kept`: ``tick``, ``data``, ``references`` and ``qp``, see the module, and the
-            robot's ``arrays``; curve of the path, and the plan that :func:`.lateral_foothold`
-            reads, or None in the plane; ``program`` and ``table`` of the phase's tasks; ``room`` of
-            :func:`.solve_free`.
-        dt: control period [s].
+    ``kept`` is a :class:`.Kept` of ``tick``, ``data``, ``references``, ``qp`` and the robot's
+    ``arrays``; the path's curve, and the plan that :func:`.lateral_foothold` reads, or None in
+    the plane; ``program`` and ``table`` of the phase's tasks; and ``room`` of :func:`.solve_free`.
     """
     (tick, data, references, qp, arrays), (curve, lateral), (program, table), _ = kept.value
     t, r, want = tick[0], data[0], references[0]
@@ -243,10 +214,7 @@ def advance(kept: Any, dt: float) -> None:
 
 @compiled
 def solve(kept: Any, found: tuple[Array, Array, Array]) -> int:
-    """Solve the QP of the rows as they are, as :func:`.solve_free` returns it.
-
-    ``kept`` is as for :func:`advance`, ``found`` as for :func:`.solve_free`.
-    """
+    """Solve the QP of the rows as they are, as :func:`.solve_free` returns it."""
     (_, data, _, qp, arrays), _, (_, table), room = kept.value
     return solve_free(qp, data, arrays, table, room, found)
 
@@ -260,10 +228,7 @@ def act(kept: Any, found: tuple[Array, Array, Array], dt: float) -> int:
 
 @compiled
 def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
-    """Move the references of the feet in the air towards their footholds, by ``dt`` [s].
-
-    ``t``, ``r``, ``want`` are of ``TICK``, ``ROBOT_DATA`` and ``REFERENCES``.
-    """
+    """Move the references of the feet in the air towards their footholds, by ``dt`` [s]."""
     f, mode, path = t.feet, t.mode, t.path
     overdue = -1  # the foot that should have found the ground by now
     if mode.next_touchdown_leg >= 0 and path.without_touchdown:
@@ -416,11 +381,7 @@ def _bear(t: Any, r: Any, qp: Any, want: Any, directions: int) -> None:
 
 @compiled
 def look(tick: Any, data: Any, references: Any, out: Any) -> None:
-    """Write where the controller is at its last tick.
-
-    ``tick``, ``data``, ``references``: see the module; ``out`` (1,), of ``SNAPSHOT``, is
-    overwritten.
-    """
+    """Write where the controller is at its last tick into ``out`` (1,), of ``SNAPSHOT``."""
     t, r, want, o = tick[0], data[0], references[0], out[0]
     f, mode, path, s, frame = t.feet, t.mode, t.path, t.sensed, t.frame
     o.time, o.phase, o.node, o.rear = t.time, path.time, mode.node, f.roles[_REAR]

@@ -15,7 +15,7 @@ import numpy as np
 from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
-from template_control.embedding.free.course import Course
+from template_control.embedding.free.motion import Course
 from template_control.embedding.free.options import (
     AnyOptions,
     SoleOptions,
@@ -37,8 +37,7 @@ from template_control.embedding.planners.modified import ModifiedOptions, Modifi
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.planners.walk_kernels import WALK
-from template_control.embedding.robot_route import robot_route
-from template_control.embedding.robot_template import check_apex, standing_options
+from template_control.embedding.robot_template import check_apex, robot_route, standing_options
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions

@@ -12,7 +12,7 @@ import numpy as np
 from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive
-from template_control.embedding.free.course import Course
+from template_control.embedding.free.motion import Course
 from template_control.embedding.robot_template import (
     can_run,
     can_stand,

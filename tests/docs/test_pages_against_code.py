@@ -15,7 +15,7 @@ import template_control as tc
 from template_control.checks.checked import Checked
 from template_control.cli.main import build_parser
 from template_control.embedding.planners.planner import Context, Decision, Planner
-from template_control.embedding.state import FloatingSnapshot
+from template_control.embedding.state import Snapshot
 from template_control.plant.plant import Plant
 from template_control.robustness import DisturbanceDistribution
 from template_control.run.specs import PlannerSpec
@@ -79,7 +79,7 @@ def test_the_members_of_a_plant():
 
 
 def test_what_the_controller_follows():
-    names = {f.name for f in fields(FloatingSnapshot)}
+    names = {f.name for f in fields(Snapshot)}
     assert set(first_names(table("your_loop.md", "attribute "))) == names
 
 

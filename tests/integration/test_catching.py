@@ -12,7 +12,7 @@ from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Cause, Decision, RestContext
 from template_control.embedding.recovery import CatchOptions, Recovery
 from template_control.embedding.replanning import free_controls
-from template_control.embedding.robot_route import robot_route
+from template_control.embedding.robot_template import robot_route
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners
 from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor

@@ -131,7 +131,7 @@ def test_a_walk_that_falls_back_sets_its_foot_down_behind(node):
     report = supervisor.reports[-1]
     assert report.goal.stride == "sb"
     np.testing.assert_array_equal(report.target, report.goal.target)
-    foothold = supervisor.landing(supervisor.feet[1]).x
+    foothold = supervisor.path.landings[1].x
     assert foothold < -0.29, "behind the CoM"
     _, after = slow(node, -0.19, (0.0, -0.5), 0.84)
     assert after.name == node, "it passes over its foot"

@@ -145,7 +145,7 @@ def supervisor(robot, gait):
 def test_in_flight_the_path_knows_where_both_feet_land(supervisor, gait):
     sensed = TemplateState(state=np.array([0.0, gait.apex[1] - 0.004, 3.0, 0.28]))
     supervisor.follow(AUTOMATON.node("F_ba^r"), sensed, 0.1)
-    first, second = supervisor.landing(0), supervisor.landing(1)
+    first, second = (supervisor.path.landings[supervisor.feet.index(foot)] for foot in (0, 1))
     assert second.x - first.x == pytest.approx(gait.step_length, abs=0.02)
     assert second.time - first.time == pytest.approx(gait.step_duration, abs=0.02)
 

@@ -5,7 +5,7 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.embedding.robot_route import robot_route
+from template_control.embedding.robot_template import robot_route
 from template_control.errors import ScenarioError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions

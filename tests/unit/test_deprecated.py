@@ -10,6 +10,7 @@ OLD_NAMES = {
     "template_control.Course",
     "template_control.embedding.BreakingPlanner",
     "template_control.embedding.ChangePlanner",
+    "template_control.embedding.FloatingSnapshot",
     "template_control.embedding.ForgettingPlanner",
     "template_control.embedding.Free",
     "template_control.embedding.FreeController",

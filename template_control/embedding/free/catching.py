@@ -30,32 +30,23 @@ _LASTS = (0.17, 0.35)  # shortest and longest time in the air [s]
 
 
 class Reach(NamedTuple):
-    """What a robot's feet can do.
+    """What a robot's feet can do; pairs are ahead and to the side."""
 
-    Attributes:
-        half: (2,) half a sole, ahead and to the side, that bears the centre of pressure [m].
-        rates: (2,) w ahead and to the side [1/s].
-        level: (2, 2) of each foot, y from the CoM where it is below its hip, and how far to either
-            side of that its sole is level [m].
-        scale: units of the template.
-    """
-
-    half: Array
-    rates: Array
+    half: Array  # (2,) half a sole that bears the centre of pressure [m]
+    rates: Array  # (2,) w [1/s]
+    # (2, 2) of each foot, y from the CoM where it is below its hip, and how far to either side of
+    # that its sole is level [m]
     level: Array
-    scale: Scale
+    scale: Scale  # units of the template
 
 
 class CatchingStep(NamedTuple):
-    """A step of a ``foot`` that lands in ``lasts`` [s] at x ``foothold`` [m].
-
-    The centre of pressure is at x ``pressure`` until then [m].
-    """
+    """A step of a foot."""
 
     foot: int
-    lasts: float
-    foothold: float
-    pressure: float
+    lasts: float  # until it lands [s]
+    foothold: float  # x where it does [m]
+    pressure: float  # x of the centre of pressure until then [m]
 
 
 def catching_step(

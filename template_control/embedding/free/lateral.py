@@ -52,14 +52,10 @@ _GAIN = 0.8  # share that a steeper angle must leave of the error's price to be 
 
 
 class LateralForecast(NamedTuple):
-    """Forecast of the next foothold to the side.
+    """Forecast of the next foothold to the side."""
 
-    ``beyond`` is how far the wanted foothold is beyond its bounds [m], NaN where none is known;
-    ``price`` is of the error that is left at the section after the foothold.
-    """
-
-    beyond: float
-    price: float
+    beyond: float  # how far the wanted foothold is beyond its bounds [m]; NaN: none is known
+    price: float  # of the error that is left at the section after the foothold
 
 
 def lateral_forecast(found: Placement, aim: LateralAim) -> LateralForecast:
@@ -77,10 +73,9 @@ def early_touchdown(
     """The decision for a step, with a steeper touchdown where the foothold is out of reach.
 
     Or where the robot's path does not come to the next section, and no foothold is known.
-    ``decision`` itself where its foothold is in reach, or no steeper step helps; else the step that
-    leaves the least error, which is not nominal. ``decide`` makes the step with a touchdown angle
-    of at least so much [rad], ``look`` is a decision's forecast to the side; a foothold that is
-    wanted further than ``reach`` [m] beyond its bounds is out of it.
+    Of the steeper steps it is the one that leaves the least error, which is not nominal. ``decide``
+    makes the step with a touchdown angle of at least so much [rad], ``look`` is a decision's
+    forecast to the side; a foothold wanted further than ``reach`` [m] beyond its bounds is out.
     """
     best, now = decision, look(decision)
     known = np.isfinite(now.price)
@@ -99,7 +94,6 @@ def early_touchdown(
 
 
 _F, _I = np.float64, np.int64
-
 LATERAL = np.dtype(
     [
         ("rolling", _F),  # of the feet, see pivot
@@ -149,9 +143,9 @@ def lateral_foothold(
 ) -> float:
     """y of the next foothold [m]; NaN where none is known.
 
-    ``lateral``, of ``LATERAL``, is overwritten. ``plan`` are the path, on which ``time`` is [s],
-    and what the foothold is for; ``com`` (2,) is y of the CoM and dy/dt [m, m/s], ``feet`` (2,) y
-    of the feet that were rear and front at the start of the path [m].
+    ``plan`` are the path, on which ``time`` is [s], and what the foothold is for; ``com`` (2,) is y
+    of the CoM and dy/dt [m, m/s], ``feet`` (2,) y of the feet that were rear and front at the start
+    of the path [m].
     """
     path, aim = plan
     pivots = np.empty(2)
@@ -169,8 +163,6 @@ def lateral_foothold(
 
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""
-
-
 _NO_AIM = LateralAim(
     state=np.zeros(2),
     step=0.0,
@@ -256,10 +248,9 @@ class LateralPlanner:
             self.cycle = lateral_cycle(self._lateral, self.wish, self.learnt.offset)
 
     def end_step(self, stance: Side, foot: float, com: Array) -> None:
-        """Learn from a nominal step that has ended at a section.
+        """Learn from a nominal step that has ended at a section with the CoM at ``com`` (2,).
 
-        ``stance`` is the side of the foot that stands now, at y ``foot`` [m]; ``com`` (2,) is y of
-        the CoM and dy/dt [m, m/s].
+        ``stance`` is the side of the foot that stands now, at y ``foot`` [m].
         """
         if self._landed is not None:
             foot = pivot(foot, com[0], float(self.data[0]["rolling"]))
@@ -268,10 +259,7 @@ class LateralPlanner:
             self.lessons[self._kind] = learnt
 
     def expect(self, due: float) -> None:
-        """Take note, at a section, of the time until the template's touchdown is due [s].
-
-        It is inf where no stance begins there.
-        """
+        """Take note of the time until the template's touchdown is due [s]; inf: it is in flight."""
         self._due = due
 
     def touch_down(self, lasted: float) -> None:
@@ -302,20 +290,16 @@ class LateralPlanner:
         self.data["step"], self.data["steps"] = self._aim.step, self._aim.steps
 
     def forecast(self, path: TemplatePath, com: Array, feet: Array) -> LateralForecast:
-        """Forecast of the next foothold, where the planar path of the robot begins.
+        """Forecast of the next foothold, where the robot's planar path begins.
 
-        ``com`` (2,) is y of the CoM and dy/dt [m, m/s]; ``feet`` (2,) are y of the feet that were
-        rear and front at the start of the path [m].
+        ``com`` and ``feet`` are as for :func:`lateral_foothold`.
         """
         self._take(path)
         pivots = pivot(feet, com[0], float(self.data[0]["rolling"]))
         return lateral_forecast(place(self._path, self._aim, 0.0, com, pivots), self._aim)
 
     def follow(self, path: TemplatePath, feet: tuple[int, int]) -> tuple[LateralPath, LateralAim]:
-        """Take the planar path that the robot is on from now on.
-
-        ``feet`` were rear and front at its start. Returns the plan of :func:`lateral_foothold`.
-        """
+        """Take the planar path from now on, with its feet; the plan of :func:`lateral_foothold`."""
         self._take(path)
         self.data["feet"] = feet
         return self._path, self._aim

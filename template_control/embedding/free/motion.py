@@ -8,14 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import atan2, cos, inf, sin
-from typing import Any
+from math import atan2, cos, inf, isnan, nan, remainder, sin, tau
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from template_control.arrays import Array
 from template_control.embedding.free.catching import Reach, catching_step
-from template_control.embedding.free.course import Course
 from template_control.embedding.free.lateral import (
     BEYOND,
     SIDES,
@@ -30,6 +29,7 @@ from template_control.embedding.planners.planner import Cause, Context, Decision
 from template_control.embedding.state import TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet, level_reach
+from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import UP, onward
 from template_control.slip.automaton.hybrid import Node
@@ -61,6 +61,36 @@ BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference temp
 # template], and comes there with this time constant [s, the same].
 FACING_RATE = 0.18
 FACING_TIME = 1.7
+TURNED_ROUND = 1.0
+"""Angle between the course and a new one from which on the robot stops in between [rad]."""
+
+
+class Course(NamedTuple):
+    """Where a robot is to go, and where its trunk is to face; its speed is the route's.
+
+    The heading frame follows the course: the template walks and runs along its x. A quadruped's
+    pairs stand below the middle of its trunk, whichever way that faces: so it goes to the left, and
+    backward, by facing away from its course, and the planes of the template know nothing of it. A
+    planar robot goes backward likewise, facing half a turn away.
+
+    Attributes:
+        left: speed to the left of the course, by footholds further to the left [m/s].
+        turning: rate at which the trunk turns, to the left [rad/s].
+        facing: angle from the course to where the trunk faces, to the left [rad]; NaN: as it is.
+    """
+
+    left: float = 0.0
+    turning: float = 0.0
+    facing: float = nan
+
+    def away(self, robot: Biped) -> float:
+        """Angle that the trunk of a robot is to turn from its course, to face so [rad]."""
+        away = self.facing - robot.facing
+        return 0.0 if isnan(away) else remainder(away, tau)
+
+    def turns_round(self, robot: Biped) -> bool:
+        """Whether a robot that goes has to stop first."""
+        return abs(self.away(robot)) > TURNED_ROUND
 
 
 def _steps(gait: Gait) -> bool:
@@ -71,10 +101,9 @@ def _steps(gait: Gait) -> bool:
 class LateralMotion:
     """Heading, and footholds to the left and right.
 
-    ``robot`` is the nominal model, which every tick updates; ``options`` are not scaled; ``side``
-    of ``references`` is kept here, and ``data`` (1,), of :data:`~.lateral.LATERAL`, is what ticks
-    read and write. Courses are followed by ramps: a jump would move the periodic motion further
-    than one step reaches.
+    Every tick updates the nominal ``robot``; ``options`` are not scaled; ``data`` (1,) is of
+    :data:`~.lateral.LATERAL`. Courses are followed by ramps: a jump would move the periodic motion
+    further than one step reaches.
     """
 
     def __init__(
@@ -108,24 +137,16 @@ class LateralMotion:
         self._facing = FACING_RATE / scale.time, FACING_TIME * scale.time
 
     def begin(self, gaits: Iterable[Gait], course: Course, in_flight: bool) -> None:
-        """Begin a run with the first gait that has steps; nothing is learnt yet.
-
-        It turns at once, unless it begins in flight.
-        """
-        self._now[:2], self._now[2] = course[:2], 0.0
+        """Begin a run with the first gait that has steps; it turns at once, but not in flight."""
+        self._now[:] = course.left, 0.0 if in_flight else course.turning, 0.0
         self._width = self.planner.wish.width
         self.robot.facing, self._turns = 0.0, 0.0
-        if in_flight:
-            self._now[1] = 0.0
         self.planner.reset(next(filter(_steps, gaits), None))
         for foot in range(2):
             self._stands(foot)
 
     def state(self, height: float, momentum_speed: bool) -> Array:
-        """(2,) y of the CoM, and dy/dt with the angular momentum if the forward speed has it.
-
-        ``height`` is the CoM's over the template's ground [m].
-        """
+        """(2,) y of the CoM at a height [m], and dy/dt, with the momentum if the phase has it."""
         s = self.robot.space
         speed = s.com_velocity[_SIDE]
         if momentum_speed:
@@ -138,18 +159,15 @@ class LateralMotion:
         supervisor: StrideSupervisor,
         mode: Mode,
         sensed: TemplateState,
-        path_time: float,
         now: float,
     ) -> Node | None:
-        """Let a robot on soles step that is pushed too hard to stand; its node then.
+        """Let a robot on soles step that is pushed too hard to stand; its node in that step.
 
-        After a deviation the rest of a step is planned anew. ``cause`` is that of a new plan, if
-        there is one; ``path_time`` is along the path, ``now`` since the start [s]. None where the
-        robot need not step, or no planner makes it.
+        After a deviation, the ``cause`` of a new plan, the rest of a step is planned anew.
         """
         robot, data, in_air = self.robot, self.robot.data[0], None
         if robot.patches and cause is Cause.DEVIATION and mode.control.follow_curve and mode.swings:
-            due = supervisor.time_of(Event.TOUCHDOWN) - path_time
+            due = supervisor.time_of(Event.TOUCHDOWN) - supervisor.phase_time
             in_air = self._feet.foot_of_leg[mode.swings[0]], due
         elif not self.planner.data[0]["leaves"]:
             return None
@@ -175,10 +193,6 @@ class LateralMotion:
         left, turning, _ = self._now.tolist()
         return Course(left, turning)
 
-    def side(self, foot: int) -> float:
-        """y of a foot [m]."""
-        return float(self.robot.space.foot_position[foot, _SIDE])
-
     def _side(self, foot: int) -> Side:
         """Side of the course that a foot is on: a robot that goes backward faces away from it.
 
@@ -192,11 +206,10 @@ class LateralMotion:
         self._stood[foot] = self.robot.space.foot_position[foot, :2]
 
     def end_stride(self, course: Course, com: Array, nominal: bool, section: Section) -> bool:
-        """Learn from the stride that has just ended, and turn the heading frame.
+        """Learn from a stride that has ended, and turn the heading frame; whether that has turned.
 
-        ``com`` (2,) is :meth:`state` where it ended; ``nominal`` says whether it went near the
-        gait, where it ended at ``section``. True if the frame has turned: the robot has to be read
-        again. A robot that rests may go anywhere next.
+        ``com`` (2,) is :meth:`state` there; ``nominal`` says whether the stride went near the gait.
+        A robot that rests may go anywhere next.
         """
         planner, stance = self.planner, self._feet.landed
         about = self._stood[stance].copy()
@@ -244,9 +257,8 @@ class LateralMotion:
     ) -> Node:
         """Take note of the stride that begins, and let it end sooner where that is better.
 
-        ``com`` (2,) is :meth:`state`, ``node`` the robot's. The supervisor, which has decided the
-        stride, follows another decision where there is a better one; returns the node that the
-        robot is in then.
+        ``com`` (2,) is :meth:`state`. The supervisor, which has decided the stride, follows another
+        decision where there is a better one; returns the node that the robot is in then.
         """
         planner, gait = self.planner, supervisor.planner.gait
         planner.data["section_began"] = time
@@ -299,8 +311,8 @@ class LateralMotion:
     def _stand(self, section: Section, node: Node, supervisor: StrideSupervisor) -> Node:
         """A stride that leads to a stand, or from it to a walk: it goes straight on.
 
-        A foot that lands in it goes to where the last gait's would; after a walk to the left, whose
-        CoM is on its way already, to where that one's would.
+        A foot that lands in it goes to where the last gait's would, or after a walk to the left,
+        whose CoM is on its way already, where that one's would.
         """
         planner = self.planner
         self._now[:], self._turns = 0.0, 0.0
@@ -317,7 +329,7 @@ class LateralMotion:
     def _turn_trunk(self, duration: float, time: float, speed: float = 0.0) -> None:
         """Turn the trunk in the stride that begins, as much as the axes turn at its end.
 
-        It banks and spins as it runs with a ``speed`` [m/s]; a walk's feet turn it.
+        It banks and spins as it runs, with a ``speed`` [m/s]; a walk's feet turn it.
         """
         data, turn = self.planner.data, self.planner.wish.turn
         data["bank"] = -atan2(speed * turn / duration, self.robot.gravity)
@@ -334,8 +346,9 @@ class LateralMotion:
 
     def lift(self, foot: int) -> None:
         """A foot begins its swing."""
-        speed = float(self.robot.data[0]["foot_velocity"][foot, _SIDE])
-        self._references.side[foot] = self.side(foot), speed, 0.0
+        now = self.robot.data[0]
+        motion = now["foot_position"][foot, _SIDE], now["foot_velocity"][foot, _SIDE], 0.0
+        self._references.side[foot] = motion
         self._references.offset[list(self.robot.groups[foot])] = 0.0
 
     def plan(self, supervisor: StrideSupervisor) -> tuple[LateralPath, LateralAim]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.embedding.learners.lean import LeanOptions
+from template_control.embedding.lean import LeanOptions
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import (
     RUNNING_SWING,
@@ -74,12 +74,7 @@ _FEET = tuple(task(leg) for leg in Leg for task in (FootTask, SideFootTask))
 
 _POINT_RUNNING = PhaseControl(
     # As in the plane, about all three axes.
-    tasks=(
-        ComTask((0.01, 10.0)),
-        SpinTask(),
-        *_FEET,
-        SpareJointTask(),
-    ),
+    tasks=(ComTask((0.01, 10.0)), SpinTask(), *_FEET, SpareJointTask()),
     swings=(Leg.FRONT,),
     swing=RUNNING_SWING,
     settles=True,
@@ -100,23 +95,13 @@ _POINT_HOPPING = replace(
 
 _POINT_SINGLE = PhaseControl(
     # As in the plane; and the CoM's y is left to the place of the feet.
-    tasks=(
-        ComTask((0.01, 10.0)),
-        OrientationTask(),
-        FootTask(),
-        SideFootTask(),
-        SpareJointTask(),
-    ),
+    tasks=(ComTask((0.01, 10.0)), OrientationTask(), FootTask(), SideFootTask(), SpareJointTask()),
     swings=(Leg.FRONT,),
 )
 
 FREE_PHASES: Phases = {
     **running_phases(
-        (
-            OrientationTask((0.01, 0.01, 0.001)),
-            *_FEET,
-            SpareJointTask(),
-        ),
+        (OrientationTask((0.01, 0.01, 0.001)), *_FEET, SpareJointTask()),
         _POINT_RUNNING,
         _POINT_DOUBLE,
         _POINT_HOPPING,
@@ -203,8 +188,7 @@ def _pair(leg: Leg) -> tuple[Task, ...]:
 
 # Of a pair that has landed, the foot that has not touched yet comes down.
 _PAIR_STANCE = PhaseControl(
-    tasks=(ComTask((0.01, 10.0)), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
-    swings=(Leg.FRONT,),
+    tasks=(ComTask((0.01, 10.0)), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)), swings=(Leg.FRONT,)
 )
 # The ground's force has no moment about the line between two feet, which is oblique: feedback that
 # moves x alone moves y too. A walk without push-off has no other means to keep its speed.

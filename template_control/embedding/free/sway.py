@@ -3,6 +3,8 @@
 Where both feet stand and the CoM follows a curve in time, and in a step from a stand, the lateral
 motion is planned as the curve's x is: by the quadratic program of :mod:`~..standing.pressure`
 through the phases that are to come, each with the feet that stand in it.
+
+``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``, ``curve`` the path's.
 """
 
 from __future__ import annotations
@@ -60,7 +62,6 @@ _REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soo
 def sway(t: Any, r: Any, want: Any, curve: tuple[Array, Array, Array]) -> None:
     """Write how a robot on soles, or on pairs of feet, is to sway.
 
-    ``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``, ``curve`` the path's.
     Along a planner's curve the centre of pressure is planned:
 
         s' = (z'' + g) / h (y - p).
@@ -237,8 +238,8 @@ def _pressure(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
 def closing_foothold(t: Any, r: Any, stands: int, lasts: float) -> float:
     """y of the foothold of a stride that ends at rest [m].
 
-    ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``; the foot ``stands`` bears the CoM for
-    ``lasts`` from now on [s]. Of a robot whose feet land in one line it is y of that foot.
+    The foot ``stands`` bears the CoM for ``lasts`` from now on [s]. Of a robot whose feet land in
+    one line it is y of that foot.
     """
     lateral, rate, stance = t.lateral, _rate(t, r), r.foot_position[stands]
     if lateral.step == 0.0:
@@ -290,7 +291,7 @@ def distance_aside(
 def _shares_ahead(t: Any, r: Any, stands: int, lasts: float) -> tuple[float, float]:
     """Least and largest share of the next step's length at which the capture point may be taken.
 
-    It is ahead of the foot ``stands``, as the foot that is in the air lands in ``lasts`` [s].
+    That is as the foot which is in the air lands, ahead of the one that ``stands``.
     """
     x, speed, rate = t.sensed.state[0], t.sensed.state[2], np.sqrt(r.gravity / _height(t, r))
     ahead = t.path.landing_x[1 - stands] - r.foot_position[stands, 0]
@@ -359,16 +360,13 @@ def _planned(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
         stays = t.feet.roles[_FRONT]
     here, half = r.foot_position[stays, _SIDE], SOLE_SHARE * lateral.half_width
     now = other = r.foot_position[1 - stays, _SIDE]
-    steps = mode.stances == 1 or lifts < ends
-    lands = due[_TOUCHDOWN] if steps else 0.0
     rests = due[_REST] <= due[_VLO]
     lasts = np.zeros(_STAGES)
-    if mode.stances > 1 and steps:
-        lasts[0] = lifts
-    if steps:
-        lasts[1] = max(min(lands, ends) - lasts[0], 0.0)
-    if steps and rests:
-        other = closing_foothold(t, r, stays, lasts[1])
+    if mode.stances == 1 or lifts < ends:
+        lasts[0] = lifts if mode.stances > 1 else 0.0
+        lasts[1] = max(min(due[_TOUCHDOWN], ends) - lasts[0], 0.0)
+        if rests:
+            other = closing_foothold(t, r, stays, lasts[1])
     middle = 0.5 * (here + other)
     if rests:
         lasts[2] = max(ends - lasts[0] - lasts[1], _REST_IN * lateral.unit)
@@ -407,10 +405,7 @@ def _planned(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
 
 @compiled
 def side_speed(t: Any, r: Any) -> float:
-    """Speed of a floating-base robot's CoM to the left, as the phase has the forward one [m/s].
-
-    ``t`` and ``r`` are of ``TICK`` and ``ROBOT_DATA``.
-    """
+    """Speed of a floating-base robot's CoM to the left, as the phase has the forward one [m/s]."""
     speed = r.com_velocity[_SIDE]
     if t.mode.momentum_speed:
         speed -= r.momentum[0] / (r.mass * t.sensed.state[1])

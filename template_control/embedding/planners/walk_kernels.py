@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from template_control.embedding.com_path import plan_is_due
+from template_control.embedding.modes import first_fired
 from template_control.embedding.planners.running import leg_bounds
 from template_control.embedding.planners.step_search import KneeLoadPenalty, Law, choose
 from template_control.robot.library import load_robot
@@ -60,6 +62,8 @@ def whole_tick() -> None:
     memory = references.data, qp.data
     sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
     stand(tick, robot.data, *memory)
+    plan_is_due(tick["path"][0], True, 0.0, 0.0, 0.0)
+    first_fired(tick[0])
     curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
     rows = tasks.program, tasks.table
     kept = keep(((tick, robot.data, *memory, robot.arrays), (curve, None), rows, qp.room(1.0)))

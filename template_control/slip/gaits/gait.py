@@ -144,6 +144,15 @@ def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
     return linear.state_jacobian, linear.control_jacobian[:, slots] * units
 
 
+def uncontrolled(gait: Gait) -> Array:
+    """(3,) n with n B = 0 for the control Jacobian B of :func:`vlo_jacobians`, n[0] = 1.
+
+    n (z - P(z, u)) is a step's drift, as a forward speed [m/s].
+    """
+    direction = np.linalg.svd(vlo_jacobians(gait)[1])[0][:, -1]
+    return np.asarray(direction / direction[0])
+
+
 def _gait(parameters: SlipParameters, z: Array, u: Array, name: str = "walk") -> WalkingGait:
     stride = simulate_stride(parameters, STRIDE_START[StrideKind.WALK], VLO.state(z), u)
     if not stride.completed or np.max(np.abs(VLO.of(stride.state) - z)) > 1e-6:

@@ -5,7 +5,7 @@ from math import pi
 import pytest
 
 import template_control as tc
-from template_control.embedding.free.course import Course
+from template_control.embedding.free.motion import Course
 from template_control.run.velocity import VelocityCommand, course_at
 
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from robot_guards import RobotGuards
 
 from template_control.embedding.com_path import at_direction, join, leg_forces, sample
-from template_control.embedding.learners.momentum import LOAD, LoadEstimate, observe_load
+from template_control.embedding.learners import LOAD, LoadEstimate, observe_load
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError, RobotError

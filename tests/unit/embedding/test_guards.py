@@ -5,18 +5,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from template_control.embedding.contacts import CONTACTS
-from template_control.embedding.modes import (
-    GUARDS,
-    PATH,
-    GuardOptions,
-    first_fired,
-    modes,
-    set_guards,
-)
+from template_control.embedding.modes import GuardOptions, first_fired, modes, set_guards
 from template_control.embedding.options import EmbeddingOptions
-from template_control.embedding.state import SENSED
-from template_control.embedding.swing import FEET
+from template_control.embedding.tick import TICK
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Outcome
 from template_control.slip.dynamics.guards import (
@@ -217,9 +208,9 @@ def test_the_guard_that_fires_is_the_first_of_its_node(kind, vlo, apex, drop, st
 )
 def test_a_robot_that_is_over_its_foot_has_passed_the_bottom(node, x, vertical, fires):
     """In a run-to-walk stride, whose stance ends there; that of a run may have it later."""
-    mode = modes(AUTOMATON, 7, EmbeddingOptions().phases)[node]
-    g, path, s, f, c = (np.zeros(1, kind)[0] for kind in (GUARDS, PATH, SENSED, FEET, CONTACTS))
-    set_guards(g, P, GuardOptions())
-    path["event_times"][:] = np.inf
-    s["state"][:] = x, 0.95, 0.7, vertical
-    assert (first_fired(g, mode.data, path, s, f, c) >= 0) == fires
+    tick = np.zeros(1, TICK)
+    tick["mode"] = modes(AUTOMATON, 7, EmbeddingOptions().phases)[node].data
+    set_guards(tick["guards"], P, GuardOptions())
+    tick["path"]["event_times"] = np.inf
+    tick["sensed"]["state"] = x, 0.95, 0.7, vertical
+    assert (first_fired(tick[0]) >= 0) == fires

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.learners.lean import (
+from template_control.embedding.lean import (
     ERROR_BOUND,
     GAIN,
     LEAN,

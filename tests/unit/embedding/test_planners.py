@@ -8,10 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import template_control as tc
-from template_control.embedding.learners.momentum import (
-    MomentumTrim,
-    uncontrolled,
-)
+from template_control.embedding.learners import MomentumTrim
 from template_control.embedding.planners import lqr
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
@@ -28,7 +25,7 @@ from template_control.embedding.supervisor import StrideSupervisor
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import vlo_jacobians
+from template_control.slip.gaits.gait import uncontrolled, vlo_jacobians
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.learners.momentum import uncontrolled
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.embedding.planners.planner import Cause, Context, RestContext
@@ -12,7 +11,12 @@ from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, MapKind, Outcome, Phase, Slot
 from template_control.slip.control.stride_solver import rest
 from template_control.slip.dynamics.stride import StrideSimulator, controls
-from template_control.slip.gaits.gait import vlo_jacobians, with_push_off, without_push_off
+from template_control.slip.gaits.gait import (
+    uncontrolled,
+    vlo_jacobians,
+    with_push_off,
+    without_push_off,
+)
 from template_control.slip.maps.return_map import ReturnMap, new_workspace
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters

@@ -43,7 +43,6 @@ class FrictionOptions(Checked):
 
 
 _F = np.float64
-
 SLIDES = np.dtype(
     [
         ("least", _F),  # load that a foot carries at least to teach anything [N]
@@ -70,13 +69,9 @@ def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array,
     ratio while the foot slides is Coulomb's coefficient. It is only ever lowered: nothing shows how
     far a foot that stands is from sliding; and ground that was slippery once may be so again.
 
-    Args:
-        s: of ``SLIDES``, overwritten.
-        standing: (n,) whether each contact is on ground to stand on; one that chatters is, though
-            it carries nothing every other millisecond.
-        force: (n, d) the ground's force on each, along the ground first and up last [N].
-        speed: (n, d - 1 or more) of their material points along the ground [m/s].
-        dt: since the last look [s].
+    A contact that chatters is ``standing`` (n,), though it carries nothing every other millisecond.
+    ``force`` (n, d) has the ground first and up last [N], ``speed`` (n, d - 1 or more) is of the
+    contacts' material points along the ground [m/s]; ``dt`` is since the last look [s].
     """
     before, level = s.coefficient, force.shape[1] - 1
     for foot in range(force.shape[0]):
@@ -129,10 +124,7 @@ def _end(s: Any, foot: int) -> None:
 def set_friction(
     data: Any, options: FrictionOptions, before: float, weight: float, scale: Scale
 ) -> None:
-    """Begin the estimate with the coefficient ``before`` anything is learnt.
-
-    ``data`` (1,), of ``SLIDES``, is overwritten; ``weight`` is the robot's [N].
-    """
+    """Begin the estimate ``data`` (1,) of a robot's ``weight`` [N], with a coefficient."""
     data["least"], data["speed"] = _LOAD * weight, SLIDING_SPEED * scale.speed
     for name in ("duration", "settling", "lowest"):
         data[name] = getattr(options, name)

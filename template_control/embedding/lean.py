@@ -106,7 +106,6 @@ class LeanOptions(Checked):
 
 
 _F = np.float64
-
 LEAN = np.dtype(
     [
         ("goal", _F),  # mean pitch of the present stride [rad]
@@ -123,10 +122,7 @@ LEAN = np.dtype(
 
 @compiled
 def advance_lean(lean: Any, pitch: float, dt: float) -> float:
-    """Reference of the pitch at this tick of ``dt`` [s], from the trunk's pitch [rad].
-
-    ``lean``, of ``LEAN``, is overwritten.
-    """
+    """Reference of the pitch [rad] at this tick of ``dt`` [s], from the trunk's pitch."""
     most = lean.rate * dt
     lean.mean += min(max(lean.goal - lean.mean, -most), most)
     lean.sum += (lean.mean - pitch) * dt
@@ -137,9 +133,8 @@ def advance_lean(lean: Any, pitch: float, dt: float) -> float:
 class TrunkLean:
     """The trunk's reference, by kind of stride and speed; it persists from stride to stride.
 
-    ``upright`` is the reference of strides without a lean of their own, ``mean`` the mean pitch
-    that is wanted now, ``correction`` what the reference adds to it [rad]. ``data`` (1,) are of
-    ``LEAN``.
+    ``upright`` is the reference of strides without a lean of their own [rad], ``data`` (1,) are of
+    ``LEAN``, which explains the other numbers.
     """
 
     mean, correction, _goal, _sum, _time = (
@@ -147,8 +142,7 @@ class TrunkLean:
     )
 
     def __init__(self, options: LeanOptions, upright: float, scale: Scale, data: Any) -> None:
-        self.options, self.data = options, data
-        self._upright = upright
+        self.options, self.data, self._upright = options, data, upright
         self.data["rate"] = LEAN_RATE * scale.factor(RATE)
         self.reset()
 

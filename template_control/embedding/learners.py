@@ -1,4 +1,4 @@
-"""Load and momentum of the robot, learnt from the feedback of the strides.
+"""Learners of a stride: when each of them learns; load and momentum of the robot, by feedback.
 
 A robot's step adds something systematic to the template's. The planner can cancel two of its
 three directions; the third, which is mostly forward speed, it cannot: from a symmetric gait, by
@@ -16,9 +16,17 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
+from template_control.embedding.friction import set_friction
+from template_control.embedding.lean import TrunkLean
+from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.state import EstimatorState
+from template_control.embedding.supervisor import StrideSupervisor
+from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Event
-from template_control.slip.gaits.gait import Gait, vlo_jacobians
+from template_control.slip.gaits.gait import Gait, uncontrolled
+from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.similarity import Scale
 from template_control.structured import Number
 
 # Load estimate.
@@ -43,13 +51,10 @@ _LARGEST_DRIFT = 0.01  # a larger drift counts as this much: a push is no drift
 TRIM_BOUND = 0.03
 """Of the trim's acceleration over g."""
 
-
-_F = np.float64
-
 LOAD = np.dtype(
     [
-        ("sum", _F),  # of the vertical feedback over the stride [m/s]
-        ("time", _F),  # over which it was summed [s]
+        ("sum", np.float64),  # of the vertical feedback over the stride [m/s]
+        ("time", np.float64),  # over which it was summed [s]
     ],
     align=True,
 )
@@ -58,11 +63,7 @@ LOAD = np.dtype(
 
 @compiled
 def observe_load(load: Any, feedback: float, dt: float) -> None:
-    """Add the feedback of one tick of ``dt`` [s] to the mean over the present stride.
-
-    ``load``, of ``LOAD``, is overwritten; ``feedback`` is the feedback part of the CoM's vertical
-    acceleration, up positive [m/s^2].
-    """
+    """Add a tick's feedback part of the CoM's vertical acceleration [m/s^2], for ``dt`` [s]."""
     load.sum += feedback * dt
     load.time += dt
 
@@ -113,34 +114,25 @@ class MomentumTrim:
     """
 
     def __init__(self, parameters: SlipParameters) -> None:
-        p = parameters
         self.forget()
-        self._speed = p.speed_unit
-        self._bound = TRIM_BOUND * p.gravity
+        self._speed = parameters.speed_unit
+        self._bound = TRIM_BOUND * parameters.gravity
         self._path: TemplatePath | None = None
         self._gait: Gait | None = None
         self._left_alone = np.zeros(3)
 
     def forget(self) -> None:
         """Begin anew: what was learnt was for another way of moving."""
-        self.acceleration = 0.0
-        self.drift = 0.0
+        self.acceleration = self.drift = 0.0
 
     def expect(self, path: TemplatePath | None, gait: Gait) -> None:
-        """Take note of the exact template's path from this VLO to the next.
-
-        None where nothing is to be learnt from it; :func:`uncontrolled` of the gait is the
-        direction that counts.
-        """
+        """Take note of the template's path from this VLO to the next; None: nothing is learnt."""
         self._path = path
         if path is not None and gait is not self._gait:
             self._gait, self._left_alone = gait, uncontrolled(gait)
 
     def end_stride(self, z: Array, nominal: bool) -> None:
-        """Learn from a step that has ended in the VLO state z (3,), dx/dt, y, dy/dt [m/s, m, m/s].
-
-        One that is not near the gait, such as a step with a push, teaches nothing.
-        """
+        """Learn from a step near the gait that has ended in the VLO state z (3,) [m/s, m, m/s]."""
         path = self._path
         if path is None or not nominal:
             return
@@ -155,10 +147,40 @@ class MomentumTrim:
         self.acceleration = float(min(max(wanted, -self._bound), self._bound))
 
 
-def uncontrolled(gait: Gait) -> Array:
-    """(3,) n with n B = 0 for the VLO map's control Jacobian B at the gait, n[0] = 1.
+class Learners:
+    """Learners from stride to stride.
 
-    n (z - P(z, u)) is a step's drift, as a forward speed [m/s].
+    ``options`` are scaled to the template, ``robot`` is the nominal model, and ``tick`` (1,) is of
+    ``TICK``, in which they keep what ticks read and write.
     """
-    direction = np.linalg.svd(vlo_jacobians(gait)[1])[0][:, -1]
-    return np.asarray(direction / direction[0])
+
+    def __init__(
+        self, options: EmbeddingOptions, parameters: SlipParameters, robot: Biped, tick: Any
+    ) -> None:
+        scale, weight = Scale.of(parameters), robot.mass * robot.gravity
+        # On soles a robot of another mass takes no nominal stride until its load is learnt.
+        self._always = bool(robot.patches)
+        self.load = LoadEstimate(robot.gravity, tick["load"])
+        self.trim = MomentumTrim(parameters)
+        self.lean = TrunkLean(options.lean, options.trunk_pitch, scale, tick["lean"])
+        set_friction(tick["slides"], options.slides, options.friction, weight, scale)
+
+    @property
+    def state(self) -> EstimatorState:
+        """Their estimates now."""
+        return EstimatorState(self.load.factor, self.trim.acceleration, self.lean.correction)
+
+    def end_stride(self, section: Section, state: Array, nominal: bool) -> None:
+        """Learn from the stride that has ended in ``state`` (4,), near the gait if ``nominal``."""
+        self.load.end_stride(nominal or self._always)
+        self.trim.end_stride(section.padded(section.of(state)), nominal)
+        self.lean.end_stride(nominal)
+
+    def begin_stride(self, supervisor: StrideSupervisor, trimmed: bool) -> None:
+        """Take note of the stride decided, in which the momentum trim acts or does not."""
+        goal, log = supervisor.goal, supervisor.log
+        if log and log[-1].goal.stride != goal.stride:
+            # A walk after a run stands up; one that leant had other drifts.
+            self.trim.forget()
+        self.lean.aim(goal)
+        self.trim.expect(supervisor.path if trimmed else None, supervisor.planner.gait)

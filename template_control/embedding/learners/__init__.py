@@ -1,1 +1,0 @@
-"""Learners from step to step: load, momentum, lean of the trunk, friction."""
