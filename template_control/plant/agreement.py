@@ -19,11 +19,9 @@ _CLOSE = 1e-6  # relative; engines agree to 1e-14
 
 
 def check_mass_matrix(robot: Biped, engine: str, mass_matrix: Callable[[Array], Array]) -> None:
-    """Compare an engine's mass matrix with Pinocchio's; a RobotError names where they differ.
+    """Compare an engine's mass matrix, by configuration, with Pinocchio's.
 
-    It depends on all that moves the robot: masses, centres of mass, inertias, joint axes and
-    placements, of the base too. ``mass_matrix`` is the engine's (nv, nv), in the model's
-    coordinates, at a configuration (nq,).
+    It depends on all that moves the robot: masses, inertias, joint axes and placements.
     """
     q = _bent(robot)
     ours, theirs = _mass_matrix(robot, q), mass_matrix(q)
@@ -43,8 +41,7 @@ def check_mass_matrix(robot: Biped, engine: str, mass_matrix: Callable[[Array], 
 def check_damping(robot: Biped, time_step: float) -> None:
     """Check that damping held for a time step [s] takes away no more speed than there is.
 
-    PyBullet and the integrator of the ideal plant overshoot then, and diverge. A RobotError names
-    the joint of the largest damping, and the time step that would do.
+    PyBullet and the integrator of the ideal plant overshoot then, and diverge.
     """
     damping = robot.joint_damping
     # Of the joints alone: nothing holds the base, so their inertia is at its least.

@@ -38,12 +38,7 @@ AXES = {2: [0, 2], 3: [0, 1, 2]}
 
 
 def moment(place: Sequence[float], force: Sequence[float]) -> tuple[float, float, float]:
-    """Moment of a force about the origin [N m]; NumPy's cross product takes 40 us.
-
-    Args:
-        place: (3,) where it acts [m].
-        force: (3,) [N].
-    """
+    """Moment of a force about the origin [N m]; NumPy's cross product takes 40 us."""
     (x, y, z), (fx, fy, fz) = place, force
     return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
@@ -166,11 +161,7 @@ class BulletPlant(EnginePlant):
         return [p.getJointInfo(self.body, i, physicsClientId=c) for i in range(count)]
 
     def _compare_masses(self, info: list[tuple[Any, ...]]) -> None:
-        """Check that the robot weighs here what it weighs in its model.
-
-        Raises:
-            RobotError: naming the link that does not.
-        """
+        """Check that the robot weighs here what it weighs in its model."""
         masses = link_masses(self.robot.urdf)
         for row in info:
             link = row[12].decode()

@@ -199,10 +199,7 @@ class IdealPlant(OptionsPlant):
         return solve(r.mass_matrix, self._right(q), *self._feet.rows(), self.contacts)
 
     def _flow(self, h: float, begin: tuple[Array, Array]) -> tuple[Array, Array, Array]:
-        """State after ``h`` seconds with the present contacts, and their impulse (n, 2).
-
-        ``begin`` holds the rates at the beginning.
-        """
+        """State after ``h`` seconds with the present contacts, and their impulse (n, 2)."""
         q, v = self._q, self._v
         a1, f1 = begin
         a2, f2 = self._rates(q + 0.5 * h * v, v2 := v + 0.5 * h * a1)
@@ -215,10 +212,7 @@ class IdealPlant(OptionsPlant):
         )
 
     def _to_event(self, h: float) -> float:
-        """Go on until a foot touches down or is released, at most ``h``; the time gone by.
-
-        The robot's update is at the present state.
-        """
+        """Go on until a foot touches down or is released, at most ``h``; the time gone by."""
         r = self.robot
         right = self._right(self._q)
         self.contacts, a, f, clean = pressing(

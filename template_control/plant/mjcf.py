@@ -194,10 +194,7 @@ def _add_joint(
     ref: float,
     lost: dict[str, str],
 ) -> None:
-    """A joint of a body; ``here`` is its frame in the body's where its angle is ``ref``.
-
-    ``lost`` holds the attributes of its damping and friction.
-    """
+    """A joint of a body; ``here`` is its frame in the body's where its angle is ``ref``."""
     hinge = bool(np.any(axis[3:]))
     about = {
         "name": model.names[joint],

@@ -33,11 +33,10 @@ _ROUNDING = 1e-9  # relative: forces and accelerations this small have no sign
 def solve(
     mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, pressed: tuple[int, ...]
 ) -> tuple[Array, Array]:
-    """Solve the system with some of the contacts held.
+    """Solve the system with some contacts held: x (nv,), and f (n, 2), zero for the others.
 
-    ``right`` is (nv,); ``jacobian`` (n, 2, nv) and ``gamma`` (n, 2) have rows x and y of each
-    contact. Returns x (nv,), and f (n, 2), zero for contacts that are not held; a LinAlgError if
-    the held contacts' rows depend on each other.
+    ``jacobian`` (n, 2, nv) and ``gamma`` (n, 2) have two rows of each contact. A LinAlgError if
+    those of the held ones depend on each other.
     """
     held = tuple(i in pressed for i in range(len(gamma)))
     determined, x, force = _solution(mass_matrix, right, jacobian, gamma, held)
@@ -50,10 +49,9 @@ def solve(
 def _solution(
     mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, ...]
 ) -> tuple[bool, Array, Array]:
-    """As :func:`solve`; ``held`` says of each contact whether it is.
+    """Whether the contacts' rows determine f, and x and f, as :func:`solve`.
 
-    With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f). The first result
-    is whether the contacts' rows determine f.
+    With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f).
     """
     # Number by number: Numba compiles operations on whole arrays for seconds.
     nv, contacts, count = right.shape[0], gamma.shape[0], 0
@@ -109,9 +107,8 @@ def pressing(
 ) -> tuple[tuple[int, ...], Array, Array, bool]:
     """Contacts among the touching ones that press: none of them pulls, none of the others sinks.
 
-    As many contacts as possible are kept. Arguments, x and f are those of :func:`solve`, for
-    accelerations and impacts alike. The last result is False where every choice would pull or sink:
-    all contacts are then held, whatever they pull.
+    As many as possible are kept, with x and f of :func:`solve`. The last result is False where
+    every choice would pull or sink: all contacts are then held, whatever they pull.
     """
     touching = tuple(touching)
     for held in _subsets(touching):
@@ -160,10 +157,7 @@ class RollingFeet:
         self._anchor[foot] = self._held(foot, q) - (0.0, closest.distance)
 
     def rows(self) -> tuple[Array, Array]:
-        """Jacobians (n, 2, nv) of the material points that touch, and their dJ/dt v (n, 2) [m/s^2].
-
-        Rows are along and out of the plane of each foot.
-        """
+        """Jacobians (n, 2, nv) of the points that touch, along and out of planes, and dJ/dt v."""
         r = self._robot
         found: tuple[Array, Array] = _rows(
             self._axes, r.foot_radius, r.contact_jacobian, r.foot_turning, r.contact_bias
@@ -193,12 +187,7 @@ class RollingFeet:
 def _rows(
     axes: Array, radius: float, lowest: Array, turning: Array, bias: Array
 ) -> tuple[Array, Array]:
-    """Rows as :meth:`RollingFeet.rows` returns them.
-
-    ``axes`` (n, 2, 2) are along and out of each foot's plane; ``lowest`` (n, 2, nv) is the Jacobian
-    of each sphere's lowest point, ``turning`` (n, nv) of its angle, and ``bias`` (n, 2) the point's
-    dJ/dt v.
-    """
+    """Rows as of :meth:`RollingFeet.rows`, from the Jacobians and bias of the lowest points."""
     jacobian, rates = np.empty_like(lowest), np.empty_like(bias)
     for foot in range(len(axes)):
         # From the sphere's lowest point, which is the model's, to the one that touches.

@@ -36,14 +36,10 @@ Points = tuple[tuple[Place, Height], ...]
 
 
 class Closest(NamedTuple):
-    """The ground's surface seen from a point.
+    """The ground's surface seen from a point."""
 
-    ``distance`` to it is negative inside the ground [m]; ``normal`` (x, y), of unit length, is out
-    of the ground, from the surface's closest point to the point itself.
-    """
-
-    distance: float
-    normal: tuple[float, float]
+    distance: float  # [m], negative inside the ground
+    normal: tuple[float, float]  # x and y of unit length, from its closest point, out of the ground
 
 
 @dataclass(frozen=True)
@@ -281,19 +277,12 @@ def _check_count(points: float) -> None:
 
 
 class Piece(NamedTuple):
-    """A box of ground.
+    """A box of ground."""
 
-    Attributes:
-        centre: x, y (across the way), and height [m].
-        half_sides: along its own axes [m].
-        pitch: its turn about +y, forward down positive [rad].
-        friction: its coefficient; None: that of the plant's options.
-    """
-
-    centre: tuple[float, float, float]
-    half_sides: tuple[float, float, float]
-    pitch: float
-    friction: float | None
+    centre: tuple[float, float, float]  # x, y (across the way), and height [m]
+    half_sides: tuple[float, float, float]  # along its own axes [m]
+    pitch: float  # its turn about +y, forward down positive [rad]
+    friction: float | None  # its coefficient; None: that of the plant's options
 
 
 def pieces(terrain: Terrain) -> tuple[float, list[Piece]]:

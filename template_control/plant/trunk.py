@@ -21,17 +21,11 @@ def read_trunk(
     q: Array,
     moving: Array,
 ) -> None:
-    """Write the trunk's place and quaternion x y z w into ``q``, by those of its CoM.
+    """Write the trunk's place and quaternion x y z w into ``q``, by ``place`` of its CoM.
 
-    Of the two quaternions of a rotation the one nearer to that in ``q`` is taken.
-
-    Args:
-        place: of the CoM in the world [m], and quaternion of the axes of inertia.
-        velocity: of the CoM [m/s], and angular velocity [rad/s], in the world.
-        turn, shift: (3, 3), (3,) frame of the trunk in its axes of inertia [m].
-        q: (nq,) overwritten.
-        moving: (5, 3) overwritten with the world's axes in the trunk's (a rotation), and the
-            velocity of the trunk's origin and its angular velocity, in the world's axes.
+    ``turn`` and ``shift`` are the frame of the trunk in its axes of inertia. ``moving`` (5, 3) is
+    overwritten with the world's axes in the trunk's, and the velocity of the trunk's origin and its
+    angular velocity, in the world's axes.
     """
     (at, (x, y, z, w)), (linear, angular) = place, velocity
     own, away = np.empty((3, 3)), np.empty(3)

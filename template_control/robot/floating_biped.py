@@ -67,15 +67,7 @@ class JointLimits(Checked):
 
 
 class SpaceTerms(NamedTuple):
-    """Terms of a robot in all three directions of its heading frame: x forward, y left, z up.
-
-    Attributes:
-        com, com_velocity, com_bias: (3,) [m, m/s, m/s^2].
-        momentum: (3,) angular, about the CoM [N m s].
-        momentum_bias: (3,) [N m].
-        foot_position: (2, 3) of the template legs' feet, the means of their contacts [m].
-        turning: (3,) angular velocity of the trunk [rad/s].
-    """
+    """Terms of a robot in all three directions of its heading frame, as of ``ROBOT_DATA``."""
 
     com: Array
     com_velocity: Array
@@ -169,8 +161,7 @@ class FloatingBaseBiped(Biped):
     def _sway_ratio(self) -> float:
         """Ratio of dy/dt of the CoM to that with the momentum, dy/dt - L_x / (m z), in a sway.
 
-        It is that of the motion in which the soles and the attitude of the trunk rest: legs that
-        swing to the side with the trunk have an angular momentum about the CoM.
+        The soles and the attitude of the trunk rest in it, and the legs swing to the side.
         """
         self.update(self.bent(), np.zeros(self.nv))
         rows, j = self.placing_rows(), self.jacobians

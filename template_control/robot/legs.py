@@ -26,18 +26,13 @@ _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)  # where the search for a lateral hip
 
 @dataclass(frozen=True)
 class StraightLegs:
-    """Legs that hang straight down from an upright trunk.
+    """Legs that hang straight down from an upright trunk."""
 
-    Attributes:
-        q: (nq,) configuration; the angle of a hinge is the one next to the middle of its range.
-        reach: from the hip's axis to the foot, with a knee as straight as its range lets it be, of
-            the leg that reaches least [m].
-        axes: (3, nv) directions of the joints' axes in the world, in ``q``.
-    """
-
-    q: Array
+    q: Array  # (nq,) configuration, with each hinge's angle next to the middle of its range
+    # From the hip's axis to the foot, with a knee as straight as its range lets it be, of the leg
+    # that reaches least [m].
     reach: float
-    axes: Array
+    axes: Array  # (3, nv) directions of the joints' axes in the world, in q
 
 
 def leg_hinges(model: pin.Model, leg: Sequence[int], flat: bool = False) -> tuple[int, ...]:

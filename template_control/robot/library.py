@@ -23,21 +23,13 @@ _PACKAGE = Path(__file__).resolve().parents[1]
 
 
 class _Entry(NamedTuple):
-    """A robot's URDF and how it is loaded.
-
-    Attributes:
-        file: name of the URDF.
-        about: one line.
-        distribution: the Python package that brings the URDF; "" for ours.
-        planar: arguments of :meth:`PlanarBiped.from_urdf`; None: it has no planar model.
-        floating: those of :meth:`FloatingBaseBiped.from_urdf`; None: its base cannot float.
-    """
+    """A robot's URDF and how it is loaded."""
 
     file: str
     about: str
-    distribution: str = ""
-    planar: Mapping[str, Any] | None = None
-    floating: Mapping[str, Any] | None = None
+    distribution: str = ""  # the Python package that brings the URDF; "" for ours
+    planar: Mapping[str, Any] | None = None  # of from_urdf; None: it has no planar model
+    floating: Mapping[str, Any] | None = None  # the same; None: its base cannot float
 
 
 # Bolt's actuator, the module of the Open Dynamic Robot Initiative (Grimminger et al., "An open

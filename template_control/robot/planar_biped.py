@@ -125,15 +125,7 @@ class PlanarBiped(Biped):
         return cls(path, urdf, model, tuple(feet), radius, walk, groups=groups)
 
     def update(self, q: Array, v: Array) -> None:
-        """Compute everything the controller needs at (q, v), each quantity once.
-
-        Args:
-            q: (nv,) configuration [m, rad].
-            v: (nv,) velocity [m/s, rad/s].
-
-        Raises:
-            DivergedError: if a value is NaN or infinite.
-        """
+        """See :meth:`~.robot.Robot.update`."""
         pin.computeAllTerms(self.model, self._data, q, v)
         # Without q: turns data.a = dJ/dt v into the CoM's bias.
         pin.centerOfMass(self.model, self._data)

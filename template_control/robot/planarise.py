@@ -48,17 +48,7 @@ def planarise(
     foot_radius: float | None,
     foot_offset: Sequence[float] | None = None,
 ) -> None:
-    """Make a 3D URDF a planar one, in place.
-
-    Args:
-        path: of the 3D URDF, for messages.
-        robot: its root element; changed.
-        feet: the two foot links.
-        sagittal_joints: hips and knees, the four hinges about the lateral axis that stay.
-        locked: angles [rad] at which other joints are held; 0 for those not named.
-        foot_radius: of spheres to put into the feet [m]; None to keep the feet's own.
-        foot_offset: of their centres from the feet's origins [m].
-    """
+    """Make a 3D URDF a planar one, in place; arguments as of :meth:`PlanarBiped.from_urdf`."""
     if len(set(sagittal_joints)) != _SAGITTAL:
         raise RobotError(
             f"{path}: sagittal_joints are {list(sagittal_joints)}: name {_SAGITTAL} different"

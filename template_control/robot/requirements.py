@@ -126,10 +126,7 @@ def check_guide(path: Path, model: pin.Model) -> None:
 
 
 def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool = False) -> None:
-    """Check that a robot with a free flyer has legs that can place their feet anywhere.
-
-    Those with a ``flat`` foot also turn it as they like, but for one direction.
-    """
+    """Check that the legs of a robot with a free flyer place their feet, or turn ``flat`` ones."""
     if len(feet) not in (LEGS, 2 * LEGS):
         raise RobotError(
             f"{len(feet)} feet were named for {path}: a biped has two, a quadruped four"
@@ -200,11 +197,9 @@ def _check_flat(
 def feet_of_legs(
     path: Path, model: pin.Model, feet: Sequence[str], groups: Sequence[Sequence[int]] | None
 ) -> tuple[tuple[int, ...], ...]:
-    """The feet of each template leg, by their places in ``feet``.
+    """The feet of each template leg, by their places in ``feet``: those given, if any.
 
-    Those given, or where None are: one each of a biped, the diagonal pairs of a quadruped, that
-    with the left front foot first. A RobotError if given ones are not each foot once, in two groups
-    of as many.
+    Else one each of a biped, and the diagonal pairs of a quadruped, first that of the left front.
     """
     if groups is not None:
         found = tuple(tuple(group) for group in groups)
@@ -258,10 +253,7 @@ def _near(given: Array, wanted: Array) -> bool:
 
 
 def add_feet(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> float:
-    """Add frames at the centres of the feet's spheres to the model; their radius [m].
-
-    A RobotError names the foot that has not one sphere, or the radii that differ.
-    """
+    """Add frames at the centres of the feet's spheres to the model; their radius [m]."""
     mend = "another, or a box, cylinder or sphere"
     shapes = collision_shapes(path, urdf, model, mend).geometryObjects
     radii = set()

@@ -49,27 +49,20 @@ class Sole(Checked):
 
 
 class Patch(NamedTuple):
-    """Sole of one foot, as a contact of the robot.
+    """Sole of one foot, as a contact of the robot."""
 
-    Attributes:
-        placement: of the toe in the frame of the foot's joint, with axes that are the trunk's
-            where all joints are at 0. The toe is the point of the sole that the template's toe
-            stands for.
-        centre: (2,) x and y of the rectangle's centre from the toe [m].
-        half_sides: (2,) of the rectangle [m].
-    """
-
+    # Of the toe in the frame of the foot's joint, with axes that are the trunk's where all joints
+    # are at 0. The toe is the point of the sole that the template's toe stands for.
     placement: pin.SE3
-    centre: Array
-    half_sides: Array
+    centre: Array  # (2,) x and y of the rectangle's centre from the toe [m]
+    half_sides: Array  # (2,) of the rectangle [m]
 
 
 def find_soles(path: Path, urdf: str, model: pin.Model, feet: Sequence[str]) -> list[Sole]:
     """Soles of all feet, from their collision shapes: rectangles around their lowest points.
 
     Spheres and capsules touch with the lowest points of their spheres; boxes, meshes and cylinders
-    with their corners. ``urdf`` is the text with these shapes, ``model`` Pinocchio's. A RobotError
-    names the foot that has no shape, or stands on a line or a point.
+    with their corners.
     """
     data, found = model.createData(), []
     pin.framesForwardKinematics(model, data, pin.neutral(model))

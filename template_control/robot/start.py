@@ -58,11 +58,7 @@ class Pose(Checked):
 
 
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
-    """(nv,) q [m, rad] and (nv,) v [m/s, rad/s] of a robot in a pose.
-
-    The robot's last update is overwritten. A RobotError says which legs do not reach, or which
-    joints would be beyond their limits.
-    """
+    """(nv,) q [m, rad] and (nv,) v [m/s, rad/s] of a robot in a pose, which it is updated to."""
     # From far away Newton's full step may bend a knee the wrong way; short ones do not.
     q = _bent_to(
         robot,
@@ -153,9 +149,7 @@ def _bent_to(
 ) -> Array:
     """(nq,) configuration of a pose, with knees bent as their ranges allow.
 
-    ``solve`` finds the pose from a configuration with bent legs by steps of a largest length [rad,
-    m], or None; ``longest`` are the lengths to try. A ParameterError if the pose has not as many
-    directions as the robot.
+    ``solve`` finds the pose from one with bent legs, or None, by steps as long as ``longest``.
     """
     places = pose.com, pose.com_velocity, pose.feet, pose.feet_velocity
     if any(place.shape[-1] != robot.directions for place in places):
@@ -199,9 +193,7 @@ def _newton(
 ) -> Array | None:
     """(nq,) configuration at which ``error`` is zero, by Newton's method; None if none is found.
 
-    ``error`` (n,) is a function of the configuration at the robot's last update; ``step`` gives the
-    (nv,) that takes the error away; of it, ``longest`` is the largest change of a coordinate [rad,
-    m].
+    ``step`` (nv,) takes the error away; ``longest`` is its largest change of a coordinate.
     """
     rest = np.zeros(robot.nv)
     for _ in range(iterations):

@@ -92,25 +92,15 @@ ROBOT_DATA = np.dtype(
 
 
 class Jacobians(NamedTuple):
-    """Matrices of the model at its last update, which Pinocchio or :func:`gather_planar` writes.
+    """Matrices of the model at its last update, which Pinocchio or :func:`gather_planar` writes."""
 
-    Attributes:
-        mass_matrix: (nv, nv) M(q).
-        nonlinear_effects: (nv,) C(q, v) v + g(q), and the joints' damping [N, N m].
-        com: (d, nv) maps v to the CoM's velocity, d the directions.
-        momentum: (1, nv) or (3, nv) angular momentum about the CoM: pitch, or all axes.
-        contact: (n, d, nv) maps v to each contact's velocity; (n, 6, nv) of patches.
-        turning: (0, nv) or (3, nv) angular velocity of a floating trunk; its bias is 0.
-        joints: (2, nu) angles and velocities of the actuated joints [rad, rad/s].
-    """
-
-    mass_matrix: Array
-    nonlinear_effects: Array
-    com: Array
-    momentum: Array
-    contact: Array
-    turning: Array
-    joints: Array
+    mass_matrix: Array  # (nv, nv) M(q)
+    nonlinear_effects: Array  # (nv,) C(q, v) v + g(q), and the joints' damping [N, N m]
+    com: Array  # (d, nv) maps v to the CoM's velocity, d the directions
+    momentum: Array  # (1, nv) or (3, nv) angular momentum about the CoM: pitch, or all axes
+    contact: Array  # (n, d, nv) maps v to each contact's velocity; (n, 6, nv) of patches
+    turning: Array  # (0, nv) or (3, nv) angular velocity of a floating trunk; its bias is 0
+    joints: Array  # (2, nu) angles and velocities of the actuated joints [rad, rad/s]
 
     @classmethod
     def zeros(
@@ -131,9 +121,8 @@ def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array)
     """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
     The sixth are those of :func:`move_point`: place, rotation, velocity and acceleration of each
-    contact's joint, and place and rotation of the contact's frame on it. ``frames`` are the
-    contacts'; ``limits`` (4, nu) the joints' largest speeds [rad/s], lower and upper stops [rad],
-    damping [N m s/rad].
+    contact's joint, and place and rotation of the contact's frame on it. ``limits`` (4, nu) are the
+    joints' largest speeds, lower and upper stops, damping [rad/s, rad, N m s/rad].
     """
     whole = (data.com[0], data.vcom[0], data.acom[0], data.hg.vector, data.g)
     bodies = [(model.frames[frame].parentJoint, model.frames[frame].placement) for frame in frames]
@@ -167,11 +156,7 @@ def move_point(points: Any, i: int, place: Array, drift: Array) -> None:
 
         p + R r,    R (a + b x r) + R w x R (v + w x r),    R b
 
-    Args:
-        points: of :func:`sources`.
-        i: number of the contact.
-        place: (3,) overwritten, in the world [m].
-        drift: (6,) overwritten, linear then angular, in the world's axes [m/s^2, rad/s^2].
+    ``place`` (3,) and ``drift`` (6,), linear then angular, are overwritten, in the world's axes.
     """
     origin, rotation, v, a, r = points[0][i], points[1][i], points[2][i], points[3][i], points[4][i]
     x, y, z = turned(rotation, r[0], r[1], r[2])
@@ -198,9 +183,7 @@ def move_point(points: Any, i: int, place: Array, drift: Array) -> None:
 def joint_reserve(q: Array, speeds: Array, limits: Array) -> tuple[float, float]:
     """Largest share of its limit that a joint's speed has, and the soonest arrival at a stop [s].
 
-    The latter is 0 of a joint that is at its stop, inf where none moves. ``q`` ends in the nu
-    angles; ``speeds`` (nu,) [rad/s]; ``limits`` (3 or more, nu) of these speeds, and lower and
-    upper stops [rad].
+    The latter is 0 of a joint that is at its stop, inf where none moves. ``q`` ends in the angles.
     """
     fastest, soonest = 0.0, np.inf
     first = q.shape[0] - speeds.shape[0]
@@ -245,14 +228,9 @@ def onward(facing: float) -> float:
 def gather_planar(kept: Any, q: Array, v: Array) -> bool:
     """Write the planar terms at the state that Pinocchio has last computed; True if it is finite.
 
-    They are of the frame whose x points where the robot goes, as ``facing`` of the data says:
-    the world's, or that turned by half a turn about the vertical.
-
-    Args:
-        kept: :class:`Kept`: views from :func:`sources`; ``data`` (1,) of ``ROBOT_DATA``; and of
-            :class:`Jacobians` ``nonlinear_effects``, ``com``, ``momentum``, ``contact`` and
-            ``joints``, all of them overwritten.
-        q, v: (nv,) the state.
+    They are of the frame whose x points where the robot goes, as ``facing`` of the data says: the
+    world's, or that turned by half a turn about the vertical. ``kept`` are the views of
+    :func:`sources`, ``ROBOT_DATA`` and some of :class:`Jacobians`, which are overwritten.
     """
     views, data, out = kept.value
     centre, speed, pull, momentum, weight, points = views[:6]
@@ -296,10 +274,7 @@ def gather_planar(kept: Any, q: Array, v: Array) -> bool:
 
 @compiled
 def _gather_feet(s: Any) -> None:
-    """Write the means over the groups of contacts; a contact by itself is the foot, as it is.
-
-    That of a leg without contacts stays at the origin: the template's toes are to be finite.
-    """
+    """Write the means over the groups of contacts; a leg without any stays at the origin."""
     for leg in range(LEGS):
         members = s.members[leg]
         if members == 0:
@@ -317,12 +292,9 @@ def _gather_feet(s: Any) -> None:
 def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
-    As :func:`gather_planar`, with q (nq,), v (nv,); ``kept`` has ``turning`` before ``joints``, and
-    last (5,) of the heading frame, x and y of its origin in the world [m], cosine and sine of the
-    heading, y of the trunk's hips from its origin [m]; and views of the trunk's rotation (3, 3) to
-    the world, of the places (3,) in the world [m] and axes (3, 3) of each hip's joint, and (n, 3) a
-    point of each hip's axis, from its joint and in its axes: in the plane in which the leg swings
-    [m].
+    As :func:`gather_planar`; ``kept`` has more Jacobians, and last the robot's ``heading_frame``,
+    views of the trunk's rotation to the world, of the places in the world and axes of each hip's
+    joint, and a point of each hip's axis in the plane in which the leg swings [m].
     """
     views, data, out, base = kept.value
     centre, speed, _, momentum, weight, points = views[:6]
@@ -407,10 +379,7 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
 
 @compiled
 def _gather_patch(s: Any, patch: int, drift: Array, frame: Array, points: Any) -> None:
-    """Write the angular drift of a patch, and its axes.
-
-    ``drift`` is from :func:`move_point`, ``points`` are of :func:`sources`.
-    """
+    """Write the angular drift of a patch, and its axes."""
     c, sine = frame[2], frame[3]
     s.contact_bias[patch, 3] = c * drift[3] + sine * drift[4]
     s.contact_bias[patch, 4] = c * drift[4] - sine * drift[3]

@@ -46,9 +46,7 @@ _ROUNDING = 1e-6  # of a link's largest moment of inertia: URDFs are written wit
 def read_urdf(path: Path) -> ET.Element:
     """The root element of a URDF; entities of its DTD are replaced, whatever its encoding.
 
-    Axes are made as long as 1, which PyBullet takes them for. Of a fixed joint, axis, limits and
-    the like mean nothing and are removed. A RobotError names what is missing, named twice or no
-    number.
+    Axes are made as long as 1, which PyBullet takes them for; of fixed joints they are removed.
     """
     if not path.is_file():
         raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
@@ -189,17 +187,14 @@ def why_impossible(link: ET.Element) -> str:
 
 
 def read_losses(path: Path, robot: ET.Element, lossless: bool) -> None:
-    """Check the joints' ``<dynamics>``; remove it if it states no loss, or all are ``lossless``.
-
-    Rotor inertias are ignored, and the log says so once.
-    """
+    """Check the joints' ``<dynamics>``; remove it if it states no loss, or all are ``lossless``."""
     _tell_rotors(path, robot)
     for joint in robot.findall("joint"):
         for dynamics in joint.findall("dynamics"):
             given = [name for name in _LOSSES if dynamics.get(name) is not None]
             for name in given:
                 text = str(dynamics.get(name))
-                if not _is_loss(text):
+                if not 0.0 <= _number(text) < np.inf:
                     raise RobotError(
                         f"{path}: joint {joint.get('name')!r}: dynamics has {name} {text!r}: give a"
                         " finite number, not below zero"
@@ -208,11 +203,12 @@ def read_losses(path: Path, robot: ET.Element, lossless: bool) -> None:
                 joint.remove(dynamics)
 
 
-def _is_loss(text: str) -> bool:
+def _number(text: str) -> float:
+    """The number that a text is; NaN if it is none."""
     try:
-        return 0.0 <= float(text) < np.inf
+        return float(text)
     except ValueError:
-        return False
+        return np.nan
 
 
 def _tell_rotors(path: Path, robot: ET.Element) -> None:
@@ -258,10 +254,7 @@ def _check_names(path: Path, robot: ET.Element) -> None:
 def _numbers(where: str, element: ET.Element, name: str, count: int, default: str = "") -> Array:
     """(count,) finite numbers of an attribute; a RobotError if it has not as many."""
     text = element.get(name, default)
-    try:
-        values = np.array([float(word) for word in text.split()])
-    except ValueError:
-        values = np.array([])
+    values = np.array([_number(word) for word in text.split()])
     if len(values) != count or not np.isfinite(values).all():
         wanted = "a finite number" if count == 1 else f"{count} finite numbers"
         hint = "; run xacro first" if "$" in text else ""
@@ -315,19 +308,12 @@ def _check_joint(path: Path, joint: ET.Element) -> None:
                 raise RobotError(f"{where}: limit has no {name}: give the joint's largest {most}")
         for name in _LIMITS:
             text = limit.get(name, "0")
-            try:
-                unread = np.isnan(float(text))
-            except ValueError:
-                unread = True
-            if unread:
+            if np.isnan(_number(text)):
                 raise RobotError(f"{where}: limit has {name} {text!r}: give a number")
 
 
 def with_masses(path: Path, urdf: str, masses: Mapping[str, float]) -> str:
-    """The text of a URDF with other masses by link [kg], and with inertias in proportion.
-
-    A RobotError names the link that is not there, or weighs nothing.
-    """
+    """The text of a URDF with other masses by link [kg], and with inertias in proportion."""
     before = {name: mass for name, mass in link_masses(urdf).items() if mass > 0.0}
     robot = ET.fromstring(urdf)
     for name, mass in masses.items():

@@ -29,11 +29,7 @@ _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begin
 
 
 def complete(path: Path, robot: ET.Element) -> str:
-    """The text of a URDF as all engines read it, once its joints and feet are as they shall be.
-
-    A RobotError names the joint without a range, the link whose inertia is no body's or whose
-    collision shape has no size, or the mesh that is missing.
-    """
+    """The text of a URDF as all engines read it, once its joints and feet are as they shall be."""
     check_motion(path, robot)
     check_inertias(path, robot)
     find_meshes(path, robot)
@@ -90,8 +86,7 @@ def lock(
 ) -> None:
     """Hold all joints but the ``moving`` ones, where ``locked`` says [rad, m] or at 0.
 
-    A joint that mimics a locked one and is not named itself is held at its multiple; a RobotError
-    if one that is not named mimics one that moves.
+    A joint that mimics a locked one and is not named itself is held at its multiple.
     """
     joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
     places: dict[str, float] = dict(locked)
@@ -169,7 +164,6 @@ def spheres(
     """Leave collision shapes to the feet alone, and give them spheres of this radius [m].
 
     None keeps the feet's own shapes; ``offset`` (3,) [m] is from the links' origins, in their axes.
-    A RobotError if the radius is not positive, or an offset comes without it.
     """
     if radius is not None and not 0.0 < radius < np.inf:
         raise RobotError(f"foot_radius is {radius!r} m: give a positive number")
@@ -191,10 +185,9 @@ def spheres(
 def find_meshes(path: Path, robot: ET.Element) -> None:
     """Write absolute paths of meshes into a URDF, so that its text can be read from anywhere.
 
-    A relative name counts from the URDF's folder; that of a package counts from each folder above
-    it, with and without the package's name, and from those of the environment variable
-    ``ROS_PACKAGE_PATH``. A visual whose mesh is missing is left out, and the log says so once: it
-    is not needed to walk. Of a collision shape it is a RobotError.
+    A relative name counts from the URDF's folder; that of a package from each folder above it, with
+    and without the package's name, and from those of ``ROS_PACKAGE_PATH``. A visual whose mesh is
+    missing is left out: it is not needed to walk. Of a collision shape it is a RobotError.
     """
     missing = []
     for link in robot.findall("link"):
@@ -249,9 +242,8 @@ def _package_folders(inside: str) -> list[str]:
 def take_points(path: Path, robot: ET.Element) -> None:
     """Take links on the trunk whose inertia is no body's for points with their mass; and log it.
 
-    Heads and arms often have such an inertia, and little of the trunk's. That of a root link, of a
-    leg, or of what is fixed to a leg counts, and is left for :func:`check_inertias`. All joints but
-    the legs' are fixed.
+    Heads and arms often have such an inertia, and little of the trunk's. That of a root link or of
+    a leg counts, and is left for :func:`check_inertias`. All joints but the legs' are fixed.
     """
     links = {link.get("name"): link for link in robot.findall("link")}
     waiting, points = [root_link(robot)], []
@@ -283,10 +275,7 @@ def write_out_massless(robot: ET.Element) -> None:
 
 
 def drop_world(robot: ET.Element) -> None:
-    """Remove a massless root link that carries nothing but a floating joint, and that joint.
-
-    Some URDFs write down that the robot floats in a world; here the root link floats anyway.
-    """
+    """Remove a massless root link that carries nothing but a floating joint: it floats anyway."""
     links = {link.get("name"): link for link in robot.findall("link")}
     joints = robot.findall("joint")
     children = {end_of(joint, "child") for joint in joints}
@@ -302,11 +291,8 @@ def drop_world(robot: ET.Element) -> None:
 def gather_inertias(robot: ET.Element) -> None:
     """Give a massless link that moves the inertia of all links that are fixed to it.
 
-    Links that are fixed to each other are one rigid body, and engines take the mass of its first
-    link for that of the body: PyBullet holds a robot in the air whose root link weighs nothing, and
-    pushes act on the first link's centre of mass. Links keep their names, frames and shapes; those
-    that gave their inertia have none. Where the first one of a body has a mass of its own, the text
-    of the URDF stays as it is.
+    Engines take the mass of a rigid body's first link for that of the body: PyBullet holds a robot
+    in the air whose root link weighs nothing, and pushes act on the first link's centre of mass.
     """
     links = {str(link.get("name")): link for link in robot.findall("link")}
     fixed = defaultdict(list)

@@ -40,19 +40,9 @@ def eliminate(
     a_map: Array,
     f_map: Array,
 ) -> bool:
-    """Accelerations and contact forces as affine functions of the joint torques.
+    """Write A with a0 in a last column, and F with f0; the first ``base_dof`` are unactuated.
 
-    Args:
-        mass_matrix: (nv, nv) M.
-        nonlinear_effects: (nv,) h.
-        jacobian: (m, nv) stacked Jacobian J of the contacts.
-        bias: (m,) dJ/dt v.
-        base_dof: unactuated coordinates, the first ones.
-        a_map: (nv, nv - base_dof + 1) overwritten: A, and a0 in the last column.
-        f_map: (m, nv - base_dof + 1) overwritten: F, and f0 in the last column.
-
-    Returns:
-        False where M or J M^-1 J^T is singular (a straight leg, coinciding contacts).
+    False where M or J M^-1 J^T is singular (a straight leg, coinciding contacts).
     """
     nv, m = mass_matrix.shape[0], jacobian.shape[0]
     nu = nv - base_dof

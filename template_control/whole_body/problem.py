@@ -74,11 +74,7 @@ The centre of pressure stays at the toe where nothing asks for more. With 1 and 
 
 @compiled
 def rows_per_contact(rows: int) -> int:
-    """Constraints of a contact: two for each tangential direction, one for the normal one.
-
-    ``rows`` are those of its force, 2 in the plane, 3 in space; 6 of a patch, which has ``CONE``
-    and one for the normal force.
-    """
+    """Constraints of a contact: two a tangential direction, or ``CONE`` of a patch; one normal."""
     return CONE + 1 if rows == PATCH else 2 * rows - 1
 
 
@@ -86,15 +82,13 @@ def rows_per_contact(rows: int) -> int:
 def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
     """Write the cone of the wrenches w that a rectangle can bear: ``out`` w >= 0.
 
-    w is force and moment at a point of the rectangle, in its axes; ``centre`` (2,) is its centre
-    from there and ``half`` (2,) its half sides X, Y [m]. With the moment m about the centre, these
-    are the rows of Caron, Pham and Nakamura (ICRA 2015, equations 12 to 16):
+    w is force and moment at a point of the rectangle, in its axes; its ``centre`` is from there
+    [m]. With half sides X, Y and the moment m about the centre, these are the rows of Caron, Pham
+    and Nakamura (ICRA 2015, equations 12 to 16):
 
         |f_x| <= mu f_z,  |f_y| <= mu f_z,  |m_x| <= Y f_z,  |m_y| <= X f_z,
         m_z <=  mu (X + Y) f_z - |Y f_x + mu m_x| - |X f_y + mu m_y|,
         m_z >= -mu (X + Y) f_z + |Y f_x - mu m_x| + |X f_y - mu m_y|.
-
-    ``out`` (CONE, 6) is overwritten.
     """
     x, y, mu, row = half[0], half[1], friction, 0
     out[:] = 0.0
@@ -117,36 +111,23 @@ def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
 
 
 class Matrices(NamedTuple):
-    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all.
+    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all."""
 
-    Attributes:
-        a_map: (nv, nu + 1) accelerations as an affine function of the torques.
-        f_map: (d c, nu + 1) contact forces as an affine function of the torques, d the directions,
-            or 6 of patches.
-        factor: (nu, nu) L in its lower triangle.
-        gradient: (nu,) L^-1 g.
-        constraint: (nu + (2 d - 1) c, nu) rows of unit length; nu more where accelerations are
-            bounded.
-        lower, upper: bounds of the rows times w.
-        minimum: (nu,) the w of least cost without the constraints.
-    """
-
-    a_map: Array
-    f_map: Array
-    factor: Array
-    gradient: Array
-    constraint: Array
-    lower: Array
+    a_map: Array  # (nv, nu + 1) accelerations as an affine function of the torques
+    f_map: Array  # (rows, nu + 1) the same of the contact forces, or wrenches of patches
+    factor: Array  # (nu, nu) L in its lower triangle
+    gradient: Array  # (nu,) L^-1 g
+    constraint: Array  # (rows, nu) of unit length; nu more where accelerations are bounded
+    lower: Array  # bounds of the rows times w
     upper: Array
-    minimum: Array
+    minimum: Array  # (nu,) the w of least cost without the constraints
 
 
 @compiled
 def matrices(work: Array, nv: int, nu: int, forces: int, rows: int) -> tuple[Array, ...]:
     """:class:`Matrices`, as a plain tuple of views into one array: a call takes one in less time.
 
-    ``work`` holds all their numbers and may be longer; ``nv``, ``nu`` are degrees of freedom and
-    actuated ones; ``forces`` d c, numbers of all contact forces; ``rows`` constraints.
+    ``forces`` are the numbers of all contact forces, ``rows`` those of the constraints.
     """
     a = nv * (nu + 1)
     b = a + forces * (nu + 1)
@@ -183,20 +164,11 @@ def assemble(
     bounds: Array,
     work: Array,
 ) -> int:
-    """Fill the QP's matrices in place.
+    """Fill the QP's matrices, in ``work``; ``SINGULAR``, ``BOUNDED``, or ``FREE``.
 
-    Args:
-        p: of ``QP_DATA``.
-        r: of ``ROBOT_DATA``.
-        arrays: of the robot.
-        tasks: (t, nv + 3), the table of a :class:`~.stack.TaskStack`.
-        torque_limit: (nu,) largest joint torques [N m].
-        bounds: (2, nu) least and greatest accelerations of the joints [rad/s^2]; (2, 0): none.
-        work: of :func:`matrices`, overwritten.
-
-    Returns:
-        ``SINGULAR``, ``BOUNDED``, or ``FREE`` where ``minimum`` keeps all constraints. They are
-        then left in z.
+    ``FREE`` where ``minimum`` keeps all constraints, which are then left in z. ``p`` is of
+    ``QP_DATA``, ``r`` of ``ROBOT_DATA``; ``tasks`` (t, nv + 3) a stack's table; ``bounds`` (2, nu)
+    the least and greatest accelerations of the joints [rad/s^2], (2, 0): none.
     """
     nv, nu, forces, rows = sizes(p, arrays, bounds)
     out = matrices(work, nv, nu, forces, rows)
@@ -309,10 +281,7 @@ def _in_sole(axes: Array, f_map: Array, first: int, out: Array) -> None:
 def _add_moments(
     p: Any, r: Any, f_map: Array, parts: tuple[Array, Array], factor: Array, gradient: Array
 ) -> None:
-    """Add the cost of the moments of the soles that stand, about their toes.
-
-    ``parts`` are a row (nu + 1,) that is overwritten, and the limits of torque.
-    """
+    """Add the cost of the soles' moments about their toes; ``parts``: a row, torque limits."""
     row, torque_limit = parts
     wrench, weight = np.empty((PATCH, f_map.shape[1])), r.mass * r.gravity
     for i in range(p.contacts):
@@ -392,11 +361,10 @@ def _backward(factor: Array, vector: Array) -> None:
 def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out`` (nu,) [N m].
 
-    They are kept within tau_max and rounded to 2^-24 of it, which is near ProxQP's tolerance. Where
-    a process has loaded another build of ProxQP than :func:`.solver.load_proxqp` does, the last
-    digits of the solution depend on where its workspace happens to lie in memory; without the
-    rounding such a walk would not be the same twice. ``factor`` (nu, nu) has L in its lower
-    triangle, ``w`` (nu,) is the solution, ``torque_limit`` (nu,) tau_max [N m].
+    They are rounded to 2^-24 of tau_max, which is near ProxQP's tolerance. Where a process has
+    loaded another build of ProxQP than :func:`.solver.load_proxqp` does, the last digits of the
+    solution depend on where its workspace happens to lie in memory; without the rounding such a
+    walk would not be the same twice.
     """
     for i in range(w.shape[0]):
         out[i] = w[i]
@@ -421,17 +389,6 @@ def _add_square(
 
 
 @compiled
-def follow(a_map: Array, f_map: Array, tau: Array, acceleration: Array, force: Array) -> None:
-    """Write the accelerations and contact forces that joint torques (nu,) [N m] bring about.
-
-    The maps are those of :func:`assemble`. ``acceleration`` (nv,) [m/s^2, rad/s^2] and ``force`` (d
-    c,), at each contact [N], are overwritten.
-    """
-    _affine(a_map, tau, acceleration)
-    _affine(f_map, tau, force)
-
-
-@compiled
 def _affine(matrix: Array, tau: Array, out: Array) -> None:
     """out = matrix[:, :-1] tau + matrix[:, -1]."""
     n = tau.shape[0]
@@ -444,25 +401,22 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 
 @compiled
 def answer(p: Any, work: Array, model: Array, found: tuple[Array, Array, Array]) -> None:
-    """Write the answer of a tick from the joint torques of the model.
+    """Write a tick's answer into ``found``: torques, forces of the contacts, accelerations.
 
-    ``p`` is of ``QP_DATA``, ``work`` of :func:`matrices`, filled by :func:`assemble`, ``model`` are
-    its torques (nu,). ``found`` is overwritten: (nu,) the robot's torques [N m], (d c,) the force
-    at each contact [N], (nv,) generalised accelerations [m/s^2, rad/s^2].
+    ``model`` are the joint torques (nu,) of the model [N m], ``work`` is what :func:`assemble` has
+    filled.
     """
     torque, force, acceleration = found
     out = matrices(work, acceleration.shape[0], torque.shape[0], force.shape[0], 0)
-    follow(out[0], out[1], model, acceleration, force)
+    _affine(out[0], model, acceleration)
+    _affine(out[1], model, force)
     for i in range(torque.shape[0]):
         torque[i] = p.load * model[i]
 
 
 @compiled
 def bounds_needed(p: Any, r: Any) -> bool:
-    """True if a joint is near its limit of speed, or the one that it has before its stop.
-
-    ``p`` is of ``QP_DATA``, ``r`` of ``ROBOT_DATA``.
-    """
+    """True if a joint is near its limit of speed, or the one that it has before its stop."""
     if r.fastest <= p.stop_share:
         return False
     return r.fastest > p.speed_share or r.soonest_stop <= p.stop_time
@@ -477,13 +431,11 @@ def solve_free(
     room: tuple[Array, Array, Array, Array],
     found: tuple[Array, Array, Array],
 ) -> int:
-    """Solve a tick in which no limit acts.
+    """Solve a tick in which no limit acts: ``FREE`` where none does.
 
-    ``qp``, ``data`` (1,) are of ``QP_DATA`` and of ``ROBOT_DATA``; ``room`` is ``torque_limit``,
-    ``bounds`` and ``work`` as for :func:`assemble`, and the model's torques as for :func:`answer`,
-    as is ``found``; both are overwritten where the tick is solved. Returns ``FREE`` where it is;
-    else what :func:`assemble` finds, or ``BRAKED`` where accelerations are to be bounded and
-    nothing has been assembled yet.
+    Else what :func:`assemble` finds, or ``BRAKED`` where accelerations are to be bounded and
+    nothing has been assembled yet. ``room`` is from :meth:`.solver.WholeBodyQp.room`, ``found`` as
+    for :func:`answer`.
     """
     p, r = qp[0], data[0]
     if bounds_needed(p, r):

@@ -71,11 +71,9 @@ _CHECKS = "proxsuite.instructionset"
 
 
 def load_proxqp() -> Any:
-    """ProxQP of proxsuite's portable build.
+    """ProxQP of proxsuite's portable build, or that which the process has imported before.
 
-    The first robot's QP of a process calls it, not an import of this library. An import of
-    proxsuite later in the process gets this build too: only one can be loaded. Of a process that
-    has imported proxsuite before, the build that it chose is taken. The log says so.
+    Only one can be loaded: a later import of proxsuite gets this one too, and the log says so.
     """
     if "proxsuite" not in sys.modules and os.environ.get(BUILD) != "native":
         none = ModuleType(_CHECKS)
@@ -181,9 +179,8 @@ def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) 
 
     with T the horizon in which a limit of speed is met, and T_s that in which a stop is.
 
-    ``bounds`` (2, nu), least and greatest [rad/s^2], are overwritten; the robot's last update is
-    read. ``slack`` is allowed at least in either direction [rad/s^2]: -inf, or 0 where a joint that
-    is too fast may stay so.
+    ``bounds`` (2, nu), least and greatest [rad/s^2], are overwritten. ``slack`` is allowed at least
+    in either direction [rad/s^2]: -inf, or 0 where a joint that is too fast may stay so.
     """
     o, limit = options, robot.velocity_limit
     place, speed, (low, high) = robot.joint_angle, robot.joint_velocity, robot.joint_stops.T
@@ -194,11 +191,7 @@ def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) 
 
 
 class Workspace:
-    """Matrices and ProxQP object for one number of contacts on the ground.
-
-    ``bounded`` is how many accelerations of joints have bounds, none or all; they are ``bounds``
-    (2, bounded) [rad/s^2]. ``work`` holds the numbers of the matrices, in one array.
-    """
+    """Matrices and ProxQP object for so many contacts, and ``bounded`` accelerations of joints."""
 
     def __init__(self, robot: Robot, contacts: int, bounded: int = 0) -> None:
         nv, nu, directions = robot.nv, len(robot.torque_limit), robot.contact_rows
@@ -301,7 +294,6 @@ class WholeBodyQp:
 
     @torque_limit.setter
     def torque_limit(self, limit: Array) -> None:
-        """Use other limits from now on."""
         self._torque_limit = limit
         self._take_load(self._load)
 
@@ -374,44 +366,29 @@ class WholeBodyQp:
         contacts = int(now["contacts"])
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
         slacks = (-np.inf, 0.0, None) if kind == BRAKED else (None,)
-        seconds = 0.0
+        seconds, solved, assembled = 0.0, False, kind != BRAKED
         for slack in slacks:
             w = (self.workspaces if slack is None else self._braked)[contacts]
             if slack is not None:
                 bound_joints(robot, self._options, w.bounds, slack)
-            found_kind, solved, more = self._attempt(w, kind, tasks, limit)
-            seconds += more
+            if not assembled:
+                arguments = (robot.arrays, tasks.table, limit, w.bounds, w.work)
+                kind = assemble(now, robot.data[0], *arguments)
+            best, solved = w.matrices.minimum, kind == FREE
+            if not solved:
+                tasks.check_finite()  # with such a number no constraint is kept
+                start = time.perf_counter()
+                solved = kind != SINGULAR and w.solve()
+                seconds += time.perf_counter() - start
+                best = w.qp.results.x
             if solved:
+                torques(w.matrices.factor, best, limit, self._torque)
                 break
-        if solved:
-            best = w.matrices.minimum if found_kind == FREE else w.qp.results.x
-            torques(w.matrices.factor, best, limit, self._torque)
         else:
-            self._tell(found_kind != SINGULAR, contacts)
+            self._tell(kind != SINGULAR, contacts)
             np.clip(self._torque, -limit, limit, out=self._torque)
         answer(now, w.work, self._torque, found)
         return seconds, solved
-
-    def _attempt(
-        self, w: Workspace, kind: int, tasks: TaskStack, limit: Array
-    ) -> tuple[int, bool, float]:
-        """Kind of the problem in this workspace, whether it is solved, and seconds in ProxQP.
-
-        Args:
-            w: in which it is, or is to be, assembled.
-            kind: of the problem there; ``BRAKED``: it is not assembled yet.
-            tasks, limit: as for :meth:`finish`.
-        """
-        robot = self.robot
-        if kind == BRAKED:
-            arguments = (robot.arrays, tasks.table, limit, w.bounds, w.work)
-            kind = assemble(self.data[0], robot.data[0], *arguments)
-        if kind == FREE:
-            return kind, True, 0.0
-        tasks.check_finite()  # with such a number no constraint is kept
-        start = time.perf_counter()
-        solved = kind != SINGULAR and w.solve()
-        return kind, solved, time.perf_counter() - start
 
     def _tell(self, regular: bool, contacts: int) -> None:
         """Log that the last solved torques are kept, once for failures in a row."""

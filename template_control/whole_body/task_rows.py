@@ -69,7 +69,7 @@ def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array)
 
 @compiled
 def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of a :class:`FootTask`; arguments as for :func:`write_rows`."""
+    """Write the rows of a :class:`FootTask`."""
     contact, foot = arrays[4], want.feet[task.leg]
     kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
     point, nv = r.group[foot, task.contact], contact.shape[2]
@@ -89,22 +89,8 @@ def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array
 
 
 @compiled
-def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`MomentumTask`; arguments as for :func:`write_rows`."""
-    momentum, height = arrays[3], want.com_now[1]
-    pitch, nv = len(momentum) // 2, momentum.shape[1]
-    inertia = r.mass * (height * height)
-    for k in range(nv):
-        rows[0, k] = momentum[pitch, k]
-    rows[0, nv + BIAS] = r.momentum_bias[1]
-    turning = inertia * task.gains[1] * (want.pitch - r.attitude[1])
-    rows[0, nv + DESIRED] = task.gains[0] * (turning - r.momentum[1])
-    rows[0, nv + WEIGHT] = task.weight[0] / (inertia * inertia)
-
-
-@compiled
 def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
-    """Write the row of a :class:`PostureTask`; arguments as for :func:`write_rows`."""
+    """Write the row of a :class:`PostureTask`."""
     nv = rows.shape[1] - 3
     rows[0, _PITCH] = onward(r.facing)
     away = task.gains[0] * (want.pitch - r.attitude[1])
@@ -113,7 +99,7 @@ def posture_rows(task: Any, r: Any, want: Any, rows: Array) -> None:
 
 @compiled
 def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of an :class:`OrientationTask`; arguments as for :func:`write_rows`."""
+    """Write the rows of an :class:`OrientationTask`."""
     turning, nv = arrays[5], rows.shape[1] - 3
     kp, kd, yaw_p, yaw_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
     for axis in range(turning.shape[0]):
@@ -125,31 +111,30 @@ def orientation_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows
 
 
 @compiled
-def spin_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of a :class:`SpinTask`.
-
-    Arguments as for :func:`write_rows`, one of each.
-    """
+def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+    """Write the row of a :class:`MomentumTask`, about the pitch's axis, or those of a spin task."""
     momentum, height = arrays[3], want.com_now[1]
     nv, inertia = momentum.shape[1], r.mass * (height * height)
-    for axis in range(momentum.shape[0]):
+    alone = task.kind == MOMENTUM
+    for row in range(1 if alone else momentum.shape[0]):
+        axis, place = (1, len(momentum) // 2) if alone else (row, row)
         for k in range(nv):
-            rows[axis, k] = momentum[axis, k]
-        rows[axis, nv + BIAS] = r.momentum_bias[axis]
+            rows[row, k] = momentum[place, k]
+        rows[row, nv + BIAS] = r.momentum_bias[axis]
         wanted = want.pitch if axis == 1 else want.lean[axis]
         error = wanted - r.attitude[axis]
         if axis == _YAW:
             error = min(max(error, -_MOST_YAW), _MOST_YAW)
-        turning = inertia * task.gains[1 + axis] * error
+        turning = inertia * task.gains[1 + row] * error
         if axis == _YAW:
             turning += want.spin
-        rows[axis, nv + DESIRED] = task.gains[0] * (turning - r.momentum[axis])
-        rows[axis, nv + WEIGHT] = task.weight[axis] / (inertia * inertia)
+        rows[row, nv + DESIRED] = task.gains[0] * (turning - r.momentum[axis])
+        rows[row, nv + WEIGHT] = task.weight[row] / (inertia * inertia)
 
 
 @compiled
 def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`SideFootTask`; arguments as for :func:`write_rows`."""
+    """Write the row of a :class:`SideFootTask`."""
     contact, foot, nv = arrays[4], want.feet[task.leg], rows.shape[1] - 3
     point = r.group[foot, task.contact]
     wanted, off = want.side[foot], want.offset[point, _SIDE]
@@ -164,7 +149,7 @@ def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: 
 
 @compiled
 def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) -> None:
-    """Write the rows of a :class:`SpareJointTask`; arguments as for :func:`write_rows`."""
+    """Write the rows of a :class:`SpareJointTask`."""
     joints, nv = arrays[6], rows.shape[1] - 3
     base_dof = nv - joints.shape[1]
     for row in range(r.spare, MOST_SPARE):
@@ -178,7 +163,7 @@ def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) ->
 
 @compiled
 def sole_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the rows of a :class:`SoleTask`; arguments as for :func:`write_rows`."""
+    """Write the rows of a :class:`SoleTask`."""
     contact, foot = arrays[4], want.feet[task.leg]
     patch, nv = r.group[foot, 0], contact.shape[2]
     axes = r.contact_axes[patch]
@@ -208,7 +193,7 @@ def _turned_back(axes: Array, row: int, column: int, c: float, s: float) -> floa
 
 @compiled
 def sway_rows(r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`SwayTask`; arguments as for :func:`write_rows`."""
+    """Write the row of a :class:`SwayTask`."""
     com, momentum, height = arrays[2], arrays[3], want.com_now[1]
     nv, moment = com.shape[1], r.mass * height
     for k in range(nv):
@@ -222,11 +207,7 @@ def sway_rows(r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
 def write_rows(
     program: Any, data: Any, arrays: tuple[Any, ...], references: Any, table: Array
 ) -> None:
-    """Let tasks write their rows into the table of a :class:`~.stack.TaskStack`.
-
-    ``program`` (n,) is of ``TASK``, ``data`` (1,) of ``ROBOT_DATA``, ``references`` (1,) of
-    ``REFERENCES``.
-    """
+    """Let the tasks of a ``program`` write their rows of a :class:`~.stack.TaskStack`'s table."""
     r, want = data[0], references[0]
     for i in range(program.shape[0]):
         task = program[i]
@@ -235,14 +216,12 @@ def write_rows(
             com_rows(task, r, arrays, want, rows)
         elif task.kind == FOOT:
             foot_rows(task, r, arrays, want, rows)
-        elif task.kind == MOMENTUM:
+        elif task.kind == MOMENTUM or task.kind == SPIN:
             momentum_rows(task, r, arrays, want, rows)
         elif task.kind == POSTURE:
             posture_rows(task, r, want, rows)
         elif task.kind == ORIENTATION:
             orientation_rows(task, r, arrays, want, rows)
-        elif task.kind == SPIN:
-            spin_rows(task, r, arrays, want, rows)
         elif task.kind == SIDE_FOOT:
             side_foot_rows(task, r, arrays, want, rows)
         elif task.kind == SOLE:

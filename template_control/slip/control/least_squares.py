@@ -21,22 +21,15 @@ _GOOD, _BAD = 0.75, 0.25  # shares of the foreseen change of the cost
 
 
 class Search(NamedTuple):
-    """How far a search goes.
+    """How far a search goes."""
 
-    Attributes:
-        rounds: steps that lower the cost; as many more may be tried again, shorter.
-        close: a step this short, in units of change, is the last: what it leaves is its square.
-        grid: points of each unknown that are tried where the start fails; 0: none.
-        save: share of the cost that a step has to save for another one.
-        patience: steps that may raise the cost, before they are taken back. Where targets are met
-            by a curved valley of unknowns, Newton's method leaves it and finds its end; with a cost
-            that always falls it creeps along.
-    """
-
-    rounds: int
-    close: float = 0.03
-    grid: int = 5
-    save: float = 0.0
+    rounds: int  # steps that lower the cost; as many more may be tried again, shorter
+    close: float = 0.03  # the last step's length in units of change: what it leaves is its square
+    grid: int = 5  # points of each unknown that are tried where the start fails; 0: none
+    save: float = 0.0  # share of the cost that a step has to save for another one
+    # Steps that may raise the cost, before they are taken back. Where targets are met by a curved
+    # valley of unknowns, Newton's method leaves it and finds its end; with a cost that always falls
+    # it creeps along.
     patience: int = 0
 
 
@@ -56,9 +49,8 @@ def bounded_step(
 ) -> Array:
     """x + dx with the least |rows dx + residual|^2 + damping |D dx|^2 between the bounds.
 
-    D holds the lengths of the columns of ``rows``: Levenberg's damping in Marquardt's scale; 0 for
-    a step of Gauss and Newton. A variable that would leave its bounds is held there, and the others
-    are solved for again. ``rows`` (r, f) is the Jacobian of the residual (r,) at x (f,).
+    D holds the lengths of the columns of ``rows``: Levenberg's damping in Marquardt's scale. A
+    variable that would leave its bounds is held there, and the others are solved for again.
     """
     size = x.shape[0]
     there = np.empty(size)
@@ -131,10 +123,7 @@ def _copy(source: _Point, target: _Point) -> None:
 
 @compiled
 def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
-    """The least cost on a grid within the bounds, and its place in ``best``; inf: all of it fails.
-
-    ``there`` is overwritten.
-    """
+    """The least cost on a grid within the bounds, its place in ``best``; inf where all fails."""
     size, least = best.x.shape[0], np.inf
     for number in range(points**size):
         left = number
@@ -154,7 +143,7 @@ def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
 def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
     """Improve x (f,) in place, for a residual of ``count`` numbers; return the least cost.
 
-    It is inf where nothing that was tried can be evaluated; x is then what it was. The problem is
+    Where nothing that was tried can be evaluated it is inf, and x what it was. The problem is
     evaluated last at the x that is returned.
     """
     size = x.shape[0]

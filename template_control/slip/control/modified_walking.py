@@ -14,8 +14,9 @@ from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
 from template_control.slip.dynamics.kernel import Scratch
-from template_control.slip.dynamics.model import Kernel, Model, model_of
+from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
+    FRONT_BOTTOM,
     REAR_BOTTOM,
     RESULTS,
     Derivatives,
@@ -25,9 +26,6 @@ from template_control.slip.maps.return_map import (
 )
 from template_control.slip.maps.section import PADDED
 
-_K_SC = int(Slot.K_SC)
-_K_SD = int(Slot.K_SD)
-_SECTION = int(Outcome.SECTION)
 _GRIDS, _COARSE, _FINE = 3, 9, 5  # of angles; points of the first grid, and of each later one
 _NARROWING = 0.75  # half-width of a grid over the spacing before: its outer angles are new ones
 _SECOND_WEIGHT = 0.1  # of the second step's squared residual: the first is to reach the target
@@ -43,41 +41,12 @@ class Aim(NamedTuple):
 
 
 class AngleSearch(NamedTuple):
-    """Parameters of :func:`search_angle`.
+    """Parameters of :func:`search_angle`."""
 
-    Attributes:
-        nominal: angle of the step after the first [rad].
-        least, greatest: angles to try [rad].
-        kappa_1: stiffness before the virtual bottom [N/m].
-    """
-
-    nominal: float
-    least: float
+    nominal: float  # angle of the step after the first [rad]
+    least: float  # angle to try [rad]
     greatest: float
-    kappa_1: float
-
-
-@compiled
-def energy_stiffness(
-    z: Array,
-    target: Array,
-    front_length: float,
-    rear_length: float,
-    kappa_1: float,
-    model: Model,
-) -> float:
-    """Stiffness kappa_2 after the virtual bottom, equation (38) [N/m].
-
-    ``z``, ``target`` (3,) are dx/dt, y, dy/dt at this VLO and wanted at the next; lengths are the
-    legs' at the virtual bottom [m], before which the stiffness is ``kappa_1`` [N/m].
-    """
-    rest_length = model.rest_length
-    mu_1 = (rest_length - target[1]) ** 2
-    mu_2 = (rest_length - z[1]) ** 2
-    mu_3 = (rest_length - front_length) ** 2 + (rest_length - rear_length) ** 2
-    kinetic = target[0] ** 2 + target[2] ** 2 - z[0] ** 2 - z[2] ** 2
-    mu_4 = model.mass * (kinetic + 2.0 * model.gravity * (target[1] - z[1]))
-    return (mu_4 + (mu_3 - mu_2) * kappa_1) / (mu_3 - mu_1)
+    kappa_1: float  # stiffness before the virtual bottom [N/m]
 
 
 @compiled
@@ -92,18 +61,24 @@ def modified_step(
 ) -> int:
     """One step with kappa_2 of (38), kept within its bounds; returns the Outcome's value.
 
-    As :func:`~template_control.slip.maps.return_map.one_stride`; ``controls`` have touchdown angle
-    and kappa_1, and kappa_2 is overwritten.
+    As :func:`~template_control.slip.maps.return_map.one_stride`; kappa_2 of the controls is
+    overwritten.
     """
     stiffness_range = aim.stiffness_range
     # The first pass finds the virtual bottom, which kappa_2 does not influence.
-    controls[_K_SD] = controls[_K_SC]
+    controls[Slot.K_SD] = controls[Slot.K_SC]
     outcome = one_stride(kernel, kind, z, controls, scratch, result)
-    rear, front = result[4], result[5]
+    rear, front = result[REAR_BOTTOM], result[FRONT_BOTTOM]
     if not np.isfinite(rear):
         return outcome
-    wanted = energy_stiffness(z, aim.target, front, rear, controls[_K_SC], model_of(kernel))
-    controls[_K_SD] = min(max(wanted, stiffness_range[0]), stiffness_range[1])
+    target, rest_length, kappa_1 = aim.target, kernel.rest_length, controls[Slot.K_SC]
+    mu_1 = (rest_length - target[1]) ** 2
+    mu_2 = (rest_length - z[1]) ** 2
+    mu_3 = (rest_length - front) ** 2 + (rest_length - rear) ** 2
+    kinetic = target[0] ** 2 + target[2] ** 2 - z[0] ** 2 - z[2] ** 2
+    mu_4 = kernel.mass * (kinetic + 2.0 * kernel.gravity * (target[1] - z[1]))
+    wanted = (mu_4 + (mu_3 - mu_2) * kappa_1) / (mu_3 - mu_1)
+    controls[Slot.K_SD] = min(max(wanted, stiffness_range[0]), stiffness_range[1])
     return one_stride(kernel, kind, z, controls, scratch, result)
 
 
@@ -120,9 +95,8 @@ def search_angle(
     """Touchdown angle whose step ends nearest ``target``, equations (36) and (37).
 
     A step is judged with the one after it (at the nominal angle), so that of two poor steps the one
-    is taken from which the gait can be reached. ``z_next`` (3,) is overwritten with the VLO state
-    after the step; the rest as in :func:`modified_step`. Returns outcome, alpha [rad], kappa_2
-    [N/m] and the squared residual of the first step.
+    is taken from which the gait can be reached; ``z_next`` (3,) is overwritten with its end.
+    Returns outcome, alpha [rad], kappa_2 [N/m] and the squared residual of the first step.
     """
     z1, z2, u = np.empty(RESULTS), np.empty(RESULTS), np.zeros(NUM_SLOTS)
     target, nominal, kappa_1 = aim.target, search.nominal, search.kappa_1
@@ -133,17 +107,17 @@ def search_angle(
         count = _COARSE if grid == 0 else _FINE
         for i in range(count):
             alpha = low + (high - low) * i / (count - 1)
-            u[0], u[_K_SC] = alpha, kappa_1
+            u[0], u[Slot.K_SC] = alpha, kappa_1
             outcome = modified_step(kernel, kind, z, aim, u, scratch, z1)
-            kappa_2 = u[_K_SD]
+            kappa_2 = u[Slot.K_SD]
             residual = np.sum((z1[:3] - target) ** 2)
-            if outcome != _SECTION:
+            if outcome != Outcome.SECTION:
                 cost = _FALL + residual
             else:
                 u[0] = nominal
                 following = modified_step(kernel, kind, z1[:3], aim, u, scratch, z2)
                 second = _SECOND_WEIGHT * np.sum((z2[:3] - target) ** 2)
-                cost = residual + (second if following == _SECTION else _FAILURE)
+                cost = residual + (second if following == Outcome.SECTION else _FAILURE)
             if cost < best_cost or best_outcome < 0:
                 best_cost, best_alpha, best_kappa = cost, alpha, kappa_2
                 best_residual, best_outcome = residual, outcome
@@ -165,22 +139,22 @@ def modified_jacobian(
 ) -> int:
     """As :func:`~template_control.slip.maps.return_map.section_jacobian`, with kappa_2 of (38).
 
-    ``at`` is kernel, kind, z and aim of :func:`modified_step`, whose ``controls`` have kappa_2. Its
-    column is the last one; along with the others it varies by
+    ``at`` is kernel, kind, z and aim of :func:`modified_step`. The column of kappa_2 is the last
+    one; along with the others it varies by
 
         dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
     """
     kernel, kind, z, aim = at
     outcome = section_jacobian(kernel, kind, z, controls, columns, work, found)
     result, jacobian, last = found.result, found.jacobian, columns.shape[0] - 1
-    rest, kappa_1, kappa_2 = kernel.rest_length, controls[_K_SC], controls[_K_SD]
+    rest, kappa_1, kappa_2 = kernel.rest_length, controls[Slot.K_SC], controls[Slot.K_SD]
     if not aim.stiffness_range[0] < kappa_2 < aim.stiffness_range[1]:
         return outcome
     mu_1, mu_2, mu_3 = (rest - aim.target[1]) ** 2, (rest - z[1]) ** 2, 0.0
     for leg in range(REAR_BOTTOM, REAR_BOTTOM + 2):
         mu_3 += (rest - result[leg]) ** 2
     for c in range(last):
-        slope = mu_3 - mu_2 if columns[c] == PADDED + _K_SC else 0.0
+        slope = mu_3 - mu_2 if columns[c] == PADDED + Slot.K_SC else 0.0
         for leg in range(REAR_BOTTOM, REAR_BOTTOM + 2):
             slope -= 2.0 * (kappa_1 - kappa_2) * (rest - result[leg]) * jacobian[leg, c]
         for i in range(RESULTS):

@@ -31,7 +31,6 @@ from template_control.slip.maps.return_map import (
 )
 from template_control.slip.maps.section import PADDED, section_of
 
-_SECTION = int(Outcome.SECTION)
 LEAST_PULL = 1e-6
 """Weight of changes where only the target counts: what changes nothing is left alone."""
 
@@ -39,22 +38,16 @@ LEAST_PULL = 1e-6
 class StrideEnd(NamedTuple):
     """Map from the controls of a stride, or of the rest of one that has begun, to its end.
 
-    Attributes:
-        kernel: automaton, template and first node.
-        kind: of the map, from :func:`~template_control.slip.maps.return_map.closed_form`.
-        start: (3,) or (6,) where it begins, as of
-            :func:`~template_control.slip.maps.return_map.one_stride`.
-        ends: (m,) which of the map's results are its end.
-        work: arrays of one thread.
-        energy: by which kappa_2 is chosen, (38); None: it is not.
+    The first three fields are arguments of
+    :func:`~template_control.slip.maps.return_map.one_stride`.
     """
 
     kernel: Kernel
     kind: int | None
     start: Array
-    ends: IntArray
+    ends: IntArray  # (m,) which of the map's results are its end
     work: MapWorkspace
-    energy: Aim | None = None
+    energy: Aim | None = None  # by which kappa_2 is chosen, (38); None: it is not
 
     def __call__(self, u: Array) -> tuple[Array, Outcome]:
         """(m,) where it ends, and how, with (NUM_SLOTS,) controls ``u``; (38) completes them."""
@@ -87,36 +80,21 @@ def rest(
 
 
 class StrideProblem(NamedTuple):
-    """The least squares of a :class:`StrideEnd` P by its free controls x.
+    """Least |W (P(x) - aim)|^2 + |pull (x - base) / change|^2 by a stride's free controls x."""
 
-        |W (P(x) - aim)|^2 + |pull (x - base) / change|^2
-
-    Attributes:
-        stride: P.
-        aim: (m,) where it should end.
-        weights: (m, m) W.
-        controls: (NUM_SLOTS,) u; the free ones are overwritten.
-        slots: (f,) of the free ones.
-        base, change, lower, upper: (f,) of these.
-        pull: weight of their changes.
-        result: (RESULTS,) overwritten.
-        columns: (f,) of the map's derivatives, and one more of a kappa_2 by (38).
-        jacobian: (RESULTS, f) of these, overwritten.
-    """
-
-    stride: StrideEnd
-    aim: Array
-    weights: Array
-    controls: Array
-    slots: IntArray
+    stride: StrideEnd  # P
+    aim: Array  # (m,) where it should end
+    weights: Array  # (m, m) W
+    controls: Array  # (NUM_SLOTS,) u, of which the free ones are overwritten
+    slots: IntArray  # (f,) of the free ones, of which are the next four
     base: Array
     change: Array
     lower: Array
     upper: Array
-    pull: float
-    result: Array
-    columns: IntArray
-    jacobian: Array
+    pull: float  # weight of their changes
+    result: Array  # (RESULTS,) overwritten
+    columns: IntArray  # (f,) of the map's derivatives, and one more of a kappa_2 by (38)
+    jacobian: Array  # (RESULTS, f) of these, overwritten
 
 
 @inner
@@ -152,7 +130,7 @@ def _stride_evaluate(problem: Any, x: Any, residual: Any) -> Any:
         m = ends.shape[0]
         for i in range(x.shape[0]):
             p.controls[p.slots[i]] = x[i]
-        if _run(p.stride.energy, p) != _SECTION:
+        if _run(p.stride.energy, p) != Outcome.SECTION:
             return np.inf
         total = 0.0
         for i in range(m):
@@ -200,58 +178,28 @@ TARGET_ONLY = Search(rounds=20, close=1e-9, grid=0, save=1e-15, patience=5)
 
 @dataclass(frozen=True)
 class Prior:
-    """Controls that a stride would have, were there no target.
+    """Controls that a stride would have, were there no target."""
 
-    Attributes:
-        controls: (NUM_SLOTS,) u by Slot; those that are not free stay.
-        slots: the f free ones.
-        table: (4, f) of these: their values, changes that count as 1, lower and upper bounds.
-        search: how far the compromise of target and base is sought; a plan needs it no better than
-            the default.
-        pull: weight of the changes.
-    """
-
-    controls: Array
-    slots: Sequence[int]
-    table: Array
-    search: Search
-    pull: float = 1.0
-
-    @property
-    def base(self) -> Array:
-        """(f,) values of the free controls."""
-        return self.table[0]
-
-    @property
-    def change(self) -> Array:
-        """(f,) changes that count as 1."""
-        return self.table[1]
-
-    @property
-    def lower(self) -> Array:
-        """(f,) lower bounds."""
-        return self.table[2]
-
-    @property
-    def upper(self) -> Array:
-        """(f,) upper bounds."""
-        return self.table[3]
+    controls: Array  # (NUM_SLOTS,) u by Slot; those that are not free stay
+    slots: Sequence[int]  # the f free ones
+    table: Array  # (4, f) of these: values, changes that count as 1, lower and upper bounds
+    search: Search  # how far the compromise of target and values is sought
+    pull: float = 1.0  # weight of the changes
 
     def grid(self, points: int) -> Array:
         """(n, f) values of the free controls: so many of each within its bounds."""
-        axes = [np.linspace(*ends, points) for ends in zip(self.lower, self.upper, strict=True)]
-        return np.array(list(product(*axes)))
+        return np.array(list(product(*np.linspace(self.table[2], self.table[3], points).T)))
 
 
 def solve_stride(
     stride: StrideEnd, aim: Array, prior: Prior, weights: Array
 ) -> tuple[Array, Array | None]:
-    """min |W (P(u) - aim)|^2 + |pull (u - base) / change|^2 over bounded u.
+    """Solve a :class:`StrideProblem`: the controls (NUM_SLOTS,), and where the stride ends (m,).
 
-    ``aim`` (m,) is where the stride should end, ``weights`` (m, m) are W. Returns (NUM_SLOTS,)
-    controls, and (m,) where the stride ends, None where none of those tried completes it.
+    The end is None where none of the controls that were tried completes the stride.
     """
     slots, u = np.array(prior.slots), np.array(prior.controls)
+    base, change, lower, upper = prior.table
     chosen = [] if stride.energy is None else [int(Slot.K_SD)]
     columns = np.array([PADDED + slot for slot in (*prior.slots, *chosen)])
     problem = StrideProblem(
@@ -261,19 +209,19 @@ def solve_stride(
         weights=np.ascontiguousarray(weights),
         controls=u,
         slots=slots,
-        base=prior.base,
-        change=prior.change,
-        lower=prior.lower,
-        upper=prior.upper,
+        base=base,
+        change=change,
+        lower=lower,
+        upper=upper,
         pull=prior.pull,
         result=np.empty(RESULTS),
         columns=columns,
         jacobian=np.empty((RESULTS, len(columns))),
     )
-    x = prior.base.copy()
+    x = base.copy()
     if _solve(problem, prior.search, x) < np.inf:
         return u, problem.result[stride.ends]
-    u[slots] = prior.base
+    u[slots] = base
     return u, None
 
 
@@ -288,9 +236,9 @@ _TRIES = 2  # as many more solutions a stride may cost
 def solve_within_reach(
     solve: Solve, z: Array, aim: Array, least: float
 ) -> tuple[Array, Array | None]:
-    """The stride that comes nearest to the speed aimed at, of a few that aim at less.
+    """The stride from ``z`` nearest to the speed of ``aim``, of a few that aim at less.
 
-    Strides from ``z`` (n,) that miss the speed of ``aim`` (n,) by less than ``least`` [m/s] stay.
+    One that misses it by less than ``least`` [m/s] stays.
     """
     u, end = solve(aim)
     if end is None:

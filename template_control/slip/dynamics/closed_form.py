@@ -21,19 +21,16 @@ from template_control.slip.dynamics.guards import (
     all_bends,
     sample,
 )
-from template_control.slip.dynamics.kernel import Scratch, apply_reset, note_lengths
+from template_control.slip.dynamics.kernel import Scratch, apply_reset, enter, note_lengths
 from template_control.slip.dynamics.locate import Watch, arm, first_event, root
-from template_control.slip.dynamics.model import Kernel, Model, backward, model_of
+from template_control.slip.dynamics.model import Kernel, backward
 
 _NEWTON = 6
 
 
 @inner
 def polar(x: float, y: float) -> tuple[float, float]:
-    """Radius [m] and angle from forward horizontal [rad] of a point above the ground.
-
-    ``x`` and the positive ``y`` are its place from the pivot [m].
-    """
+    """Radius [m] and angle from forward horizontal [rad] of a point above a pivot."""
     return np.sqrt(x * x + y * y), np.arctan2(y, x)
 
 
@@ -41,10 +38,9 @@ def polar(x: float, y: float) -> tuple[float, float]:
 def axial_torsional(
     spread: float, stiffness: float, mass: float, gravity: float, rest_length: float
 ) -> tuple[float, float, float]:
-    """AT-SLIP that stands in for two legs: (18) to (25), with the notes' reading of (23).
+    """AT-SLIP that stands in for two legs: k_r [N/m], l_r0 [m], k_t [N m/rad], (18) to (25).
 
-    ``spread`` is c, the distance of the toes [m], ``stiffness`` that of either leg [N/m]. Returns
-    k_r [N/m], l_r0 [m], k_t [N m/rad].
+    (23) is read as in the notes. ``spread`` is c, the distance of the toes [m].
     """
     half = 0.25 * spread * spread
     weight = mass * gravity
@@ -66,11 +62,7 @@ def axial_torsional(
 
 
 class Launch(NamedTuple):
-    """Start of a stance phase, in polar coordinates.
-
-    ``pivot`` is x of their origin [m], ``r`` and ``theta`` are the CoM's [m, rad], ``radial_speed``
-    is dr/dt [m/s].
-    """
+    """Start of a stance phase: the CoM in polar coordinates about x of a pivot, and dr/dt."""
 
     pivot: float
     r: float
@@ -89,8 +81,7 @@ def harmonic(
 ) -> None:
     """Coefficients of (11) into ``a`` (12,), see :class:`~.guards.Path`.
 
-    ``momentum`` is p / m, constant over the phase [m^2/s], ``frequency_squared`` omega_0^2 = k/m
-    [1/s^2], ``length`` l0, or l_r0 of the AT-SLIP [m].
+    ``momentum`` is p / m [m^2/s], ``frequency_squared`` k / m, ``length`` l0, or l_r0 of the AT.
     """
     pivot, r, theta, radial_speed = start
     omega = momentum / (length * length)
@@ -112,8 +103,7 @@ def harmonic(
 def momentum_changes(a: Array, t: float, gravity: tuple[float, float], torsion: float) -> float:
     """Change of p/m over [0, t] by gravity (12), (13) and the torsional spring (27).
 
-    ``a`` (12,) is the first iteration's path; ``gravity`` acts into the ground, and along it,
-    backward positive [m/s^2]; ``torsion`` is k_t / m, 0 in single stance.
+    ``gravity`` acts into the ground, and along it backward [m/s^2]; ``torsion`` is k_t / m.
     """
     w, l1, l2 = a[5], a[2], a[3]
     s, c = np.sin(w * t), np.cos(w * t)
@@ -151,7 +141,7 @@ def corrected(
     momentum: float,
     toes: Array,
     stiffness: Array,
-    model: Model,
+    kernel: Kernel,
     out: Array,
 ) -> float:
     """Improve the path ``a`` in place by one deferred correction; p/m at ``t`` [m^2/s].
@@ -160,12 +150,9 @@ def corrected(
     differ from what it assumes by a defect; a quadratic in time through the three is added
     to the right-hand side of the radial equation, which still has a closed-form solution.
     The angular rate p(t) / (m r(t)^2) is interpolated through the same three points.
-
-    ``a`` (12,) is the first path, from :func:`harmonic`, ``t`` the time of the event that ends the
-    phase on it [s], ``momentum`` p/m at the start [m^2/s], ``out`` (6,) scratch.
     """
-    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
-    along = backward(model, stiffness)
+    mass, gravity, rest_length = kernel.mass, kernel.gravity, kernel.rest_length
+    along = backward(kernel, stiffness)
     w2 = a[5] * a[5]
     # Radial defects and torques at 0, t/2 and t.
     pull_0 = pull_1 = pull_2 = torque_0 = torque_1 = torque_2 = 0.0
@@ -220,11 +207,6 @@ def corrected(
     return p2
 
 
-_GEYER = int(MapKind.GEYER)
-_PAPER = int(MapKind.PAPER)
-_IMPROVED = int(MapKind.IMPROVED)
-_TIMEOUT = int(Outcome.TIMEOUT)
-_FALL = int(Outcome.FALL)
 _MAX_PIECES = 24
 _NO_EVENT, _GOES_ON = -1, -2
 _PIECE = 2.7  # radians of the spring's oscillation that one improved path covers at most
@@ -260,28 +242,25 @@ def _end_velocity(a: Array, momentum: float, t: float, state: Array, out: Array)
 
 
 @inner
-def _potential(state: Array, toes: Array, stiffness: Array, model: Model) -> float:
+def _potential(state: Array, toes: Array, stiffness: Array, kernel: Kernel) -> float:
     """Energy over mass of gravity, of what else acts along the ground, and of springs [J/kg]."""
     x, y = state[0], state[1]
-    potential = model.gravity * y + backward(model, stiffness) * x
+    potential = kernel.gravity * y + backward(kernel, stiffness) * x
     for leg in range(2):
         if stiffness[leg] == 0.0:
             continue
-        d = model.rest_length - np.sqrt((x - toes[leg]) ** 2 + y * y)
-        potential += 0.5 * stiffness[leg] / model.mass * d * d
+        d = kernel.rest_length - np.sqrt((x - toes[leg]) ** 2 + y * y)
+        potential += 0.5 * stiffness[leg] / kernel.mass * d * d
     return potential
 
 
 @inner
 def _stance(
-    map_kind: int, model: Model, state: Array, stiffness: Array, a: Array, watch: Watch
+    map_kind: int, kernel: Kernel, state: Array, stiffness: Array, a: Array, watch: Watch
 ) -> int:
-    """Carry ``state`` to the end of a stance phase; the edge that fires.
-
-    ``_NO_EVENT`` if none does, ``_GOES_ON`` where the phase is too long for one path.
-    """
-    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
-    pull = (gravity, backward(model, stiffness))
+    """Carry ``state`` to a stance phase's end; the edge, ``_NO_EVENT``, or ``_GOES_ON``."""
+    mass, gravity, rest_length = kernel.mass, kernel.gravity, kernel.rest_length
+    pull = (gravity, backward(kernel, stiffness))
     toes, out = watch.toes, watch.out
     torsion = 0.0
     if stiffness[0] == 0.0 or stiffness[1] == 0.0:
@@ -292,7 +271,7 @@ def _stance(
         mean = 0.5 * (stiffness[0] + stiffness[1])
         if stiffness[0] != stiffness[1]:
             # The AT-SLIP stands for two equal legs; for others only the correction is right.
-            map_kind = _IMPROVED
+            map_kind = MapKind.IMPROVED
         k, length, torsion = axial_torsional(toes[1] - toes[0], mean, mass, gravity, rest_length)
     r, theta = polar(state[0] - pivot, state[1])
     c, s = (state[0] - pivot) / r, state[1] / r
@@ -302,34 +281,34 @@ def _stance(
     start = Launch(pivot, r, theta, radial)
     harmonic(a, start, momentum, w2, length, gravity)
     path = Path(a, a)
-    horizon, accuracy = model.max_time, _EVENT_TIME
-    if map_kind == _IMPROVED:
+    horizon, accuracy = kernel.max_time, _EVENT_TIME
+    if map_kind == MapKind.IMPROVED:
         horizon, accuracy = _PIECE / a[5], _NODE_TIME
     substep = _SUBSTEP * np.sqrt(rest_length / gravity)
     edge, t = first_event(STANCE, path, horizon, substep, accuracy, watch)
-    if map_kind != _IMPROVED and edge < 0:
+    if map_kind != MapKind.IMPROVED and edge < 0:
         return _NO_EVENT
     if edge >= 0 and t == 0.0:
         return edge  # the phase ends as it begins: there is nothing to correct over no time
-    if map_kind == _IMPROVED:
+    if map_kind == MapKind.IMPROVED:
         if edge < 0:
             edge = _GOES_ON
             t = _SAFE_SHARE * horizon
-        end = corrected(a, t, momentum, toes, stiffness, model, out)
-    elif map_kind == _PAPER:
+        end = corrected(a, t, momentum, toes, stiffness, kernel, out)
+    elif map_kind == MapKind.PAPER:
         end = momentum + momentum_changes(a, t, pull, torsion / mass)
         harmonic(a, start, end, w2, length, gravity)
     else:
         end = momentum
-    if map_kind != _GEYER and edge >= 0:
+    if map_kind != MapKind.GEYER and edge >= 0:
         t = _follow(path, edge, t, watch)
         if t < 0.0:
             return _NO_EVENT
-    before = 0.5 * (state[2] ** 2 + state[3] ** 2) + _potential(state, toes, stiffness, model)
+    before = 0.5 * (state[2] ** 2 + state[3] ** 2) + _potential(state, toes, stiffness, kernel)
     _end_velocity(a, end, t, state, out)
-    if map_kind == _IMPROVED:
+    if map_kind == MapKind.IMPROVED:
         # Energy is conserved within a phase, so the end speed is known.
-        squared = 2.0 * (before - _potential(state, toes, stiffness, model))
+        squared = 2.0 * (before - _potential(state, toes, stiffness, kernel))
         ratio = squared / (state[2] ** 2 + state[3] ** 2)
         if ratio > 0.0:
             scale = np.sqrt(ratio)
@@ -347,53 +326,42 @@ def closed_form_stride(
     controls: Array,
     scratch: Scratch,
 ) -> int:
-    """As :func:`~.kernel.run_stride`, with one closed-form map a phase; the Outcome's value.
-
-    ``map_kind`` is the value of a MapKind other than EXACT; ``state`` and ``toes`` are overwritten.
-    """
-    tables, model, node = kernel.tables, model_of(kernel), kernel.node
+    """As :func:`~.kernel.run_stride`, with one closed-form map a phase; the Outcome's value."""
+    tables, node = kernel.tables, kernel.node
     alpha = controls[0]
-    rest_length = model.rest_length
+    rest_length = kernel.rest_length
     touchdown_height = rest_length * np.sin(alpha)
-    a, out, probe, stiffness = scratch.path, scratch.out, scratch.probe, scratch.stiffness
-    values, armed, bends = scratch.values, scratch.armed, scratch.bends
+    a, out, stiffness, bends = scratch.path, scratch.out, scratch.stiffness, scratch.bends
     event = -1
     for _ in range(_MAX_PIECES):
-        rear, front = tables.rear[node], tables.front[node]
-        stiffness[0] = controls[rear] if rear >= 0 else 0.0
-        stiffness[1] = controls[front] if front >= 0 else 0.0
-        first_edge = tables.first_edge[node]
-        guards = tables.event[first_edge : tables.first_edge[node + 1]]
-        watch = Watch(
-            guards, toes, rest_length, touchdown_height, values, armed, bends, out=out, probe=probe
-        )
+        watch = enter(kernel, node, toes, controls, touchdown_height, scratch)
         arm(watch, state, event)
         if stiffness[0] == 0.0 and stiffness[1] == 0.0:
             for i in range(4):
                 a[i] = state[i]
-            a[4], a[5] = model.gravity, model.along
-            pull = model.gravity + abs(model.along)
-            speed = abs(state[2]) + abs(state[3]) + pull * model.max_time
-            all_bends(state, toes, rest_length, (speed, pull, 0.0), model.max_time, bends)
+            a[4], a[5] = kernel.gravity, kernel.along
+            pull = kernel.gravity + abs(kernel.along)
+            speed = abs(state[2]) + abs(state[3]) + pull * kernel.max_time
+            all_bends(state, toes, rest_length, (speed, pull, 0.0), kernel.max_time, bends)
             path = Path(a, a)
-            substep = _SUBSTEP * np.sqrt(rest_length / model.gravity)
-            edge, t = first_event(FLIGHT, path, model.max_time, substep, _EVENT_TIME, watch)
+            substep = _SUBSTEP * np.sqrt(rest_length / kernel.gravity)
+            edge, t = first_event(FLIGHT, path, kernel.max_time, substep, _EVENT_TIME, watch)
             sample(FLIGHT, path, t, out)
             for i in range(4):
                 state[i] = out[i]
         else:
             bends[:] = 0.0  # such a path's guards are looked at where substeps end
-            edge = _stance(map_kind, model, state, stiffness, a, watch)
+            edge = _stance(map_kind, kernel, state, stiffness, a, watch)
         if edge == _NO_EVENT or not np.isfinite(state[0] + state[2]):
-            return _TIMEOUT
+            return Outcome.TIMEOUT
         if edge == _GOES_ON:
             event = -1
             continue
-        edge += first_edge
+        edge += tables.first_edge[node]
         event = tables.event[edge]
         note_lengths(event, state, toes, scratch.lengths)
         apply_reset(tables.reset[edge], state, toes, rest_length, alpha)
         if tables.outcome[edge] >= 0:
             return tables.outcome[edge]
         node = tables.target[edge]
-    return _TIMEOUT
+    return Outcome.TIMEOUT

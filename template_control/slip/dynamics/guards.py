@@ -21,14 +21,12 @@ COEFFICIENTS = 12
 
 
 class Path(NamedTuple):
-    """A path of the CoM in time, world frame, by its coefficients.
+    """A path of the CoM in time, world frame, by its coefficients a and b.
 
-    Attributes:
-        a, b: SERIES: those of the polynomials of x and y, constant term first. STANCE: a is
-            (12,), about a pivot at x = a0, r = a1 + a8 t + a9 t^2 + a2 sin(a5 t) + a3 cos(a5 t) and
-            theta = a4 + a6 t + a10 t^2 + a11 t^3 + a7 (a2 cos(a5 t) - a3 sin(a5 t)), which
-            is (11) where a8 to a11 are zero. FLIGHT: a is (6,) x, y, dx/dt, dy/dt at t = 0
-            and gravity, into the ground and along it. The latter two do not read b.
+    SERIES: of the polynomials of x and y, constant term first. STANCE: a is (12,), about a pivot at
+    x = a0, r = a1 + a8 t + a9 t^2 + a2 sin(a5 t) + a3 cos(a5 t) and theta = a4 + a6 t + a10 t^2 +
+    a11 t^3 + a7 (a2 cos(a5 t) - a3 sin(a5 t)), which is (11) where a8 to a11 are zero. FLIGHT: a is
+    (6,) x, y, dx/dt, dy/dt at t = 0 and gravity, into the ground and along it.
     """
 
     a: Array
@@ -78,14 +76,7 @@ _BY_KIND = (_series, _stance, _flight)
 
 
 def sample(kind: int, path: Path, t: float, out: Array) -> None:
-    """Write x, y and their first two derivatives at ``t`` [s] into ``out`` (6,).
-
-    Args:
-        kind: SERIES, STANCE or FLIGHT.
-        path: its coefficients.
-        t: since the start of the path [s].
-        out: overwritten.
-    """
+    """Write x, y and their first two derivatives at ``t`` [s] of a path into ``out`` (6,)."""
     _BY_KIND[kind](kind, path, t, out)
 
 
@@ -95,45 +86,31 @@ def _kind(kind: Any, path: Any, t: Any, out: Any) -> Any:
     return _BY_KIND[kind.literal_value] if isinstance(kind, types.IntegerLiteral) else None
 
 
-# Numba freezes module-level integers into the compiled code.
-_TOUCHDOWN = int(Event.TOUCHDOWN)
-_REAR_LIFTOFF = int(Event.REAR_LIFTOFF)
-_FRONT_LIFTOFF = int(Event.FRONT_LIFTOFF)
-_APEX = int(Event.APEX)
-_BOTTOM = int(Event.BOTTOM)
-_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
-_VLO = int(Event.VLO)
-_PASSED_FRONT_FOOT = int(Event.PASSED_FRONT_FOOT)
-_FALL = int(Event.FALL)
-_BACKWARD = int(Event.BACKWARD)
-_REST = int(Event.REST)
-
-
 @inner
 def guard(
     event: int, state: Array, toes: Array, rest_length: float, touchdown_height: float
 ) -> float:
     """Value of the guard of an event; it fires when it rises through 0."""
     x, y, u, v = state[0], state[1], state[2], state[3]
-    if event == _TOUCHDOWN:
+    if event == Event.TOUCHDOWN:
         return touchdown_height - y
-    if event == _REAR_LIFTOFF:
+    if event == Event.REAR_LIFTOFF:
         return np.sqrt((x - toes[0]) ** 2 + y * y) - rest_length
-    if event == _FRONT_LIFTOFF:
+    if event == Event.FRONT_LIFTOFF:
         return np.sqrt((x - toes[1]) ** 2 + y * y) - rest_length
-    if event == _APEX:
+    if event == Event.APEX:
         return -v
-    if event == _BOTTOM:
+    if event == Event.BOTTOM:
         return (x - toes[0]) * u + y * v
-    if event == _VIRTUAL_BOTTOM:
+    if event == Event.VIRTUAL_BOTTOM:
         return (x - 0.5 * (toes[0] + toes[1])) * u + y * v
-    if event == _VLO:
+    if event == Event.VLO:
         return x - toes[0]
-    if event == _PASSED_FRONT_FOOT:
+    if event == Event.PASSED_FRONT_FOOT:
         return x - toes[1]
-    if event == _FALL:
+    if event == Event.FALL:
         return -y
-    if event == _REST:
+    if event == Event.REST:
         return -(u * u + v * v)
     return -u
 
@@ -142,23 +119,20 @@ def guard(
 def all_guards(
     state: Array, toes: Array, rest_length: float, touchdown_height: float, values: Array
 ) -> None:
-    """Write all guards at once into ``values`` (NUM_EVENTS,), by Event.
-
-    There is no branch in it, which makes it faster than :func:`guard` for a few of them.
-    """
+    """Write all guards into ``values`` by Event: without a branch, faster than a few by one."""
     x, y, u, v = state[0], state[1], state[2], state[3]
     rear, front = x - toes[0], x - toes[1]
-    values[_TOUCHDOWN] = touchdown_height - y
-    values[_REAR_LIFTOFF] = np.sqrt(rear * rear + y * y) - rest_length
-    values[_FRONT_LIFTOFF] = np.sqrt(front * front + y * y) - rest_length
-    values[_APEX] = -v
-    values[_BOTTOM] = rear * u + y * v
-    values[_VIRTUAL_BOTTOM] = 0.5 * (rear + front) * u + y * v
-    values[_VLO] = rear
-    values[_PASSED_FRONT_FOOT] = front
-    values[_FALL] = -y
-    values[_BACKWARD] = -u
-    values[_REST] = -(u * u + v * v)
+    values[Event.TOUCHDOWN] = touchdown_height - y
+    values[Event.REAR_LIFTOFF] = np.sqrt(rear * rear + y * y) - rest_length
+    values[Event.FRONT_LIFTOFF] = np.sqrt(front * front + y * y) - rest_length
+    values[Event.APEX] = -v
+    values[Event.BOTTOM] = rear * u + y * v
+    values[Event.VIRTUAL_BOTTOM] = 0.5 * (rear + front) * u + y * v
+    values[Event.VLO] = rear
+    values[Event.PASSED_FRONT_FOOT] = front
+    values[Event.FALL] = -y
+    values[Event.BACKWARD] = -u
+    values[Event.REST] = -(u * u + v * v)
 
 
 @inner
@@ -170,48 +144,43 @@ def all_bends(
     step: float,
     bends: Array,
 ) -> None:
-    """Write bounds of all guards' second time derivatives along a path into ``bends``.
+    """Write bounds of all guards' second time derivatives along a path into ``bends``, by Event.
 
-    That of a leg holds where it is longer than l0 / 2, and from below it holds always. REST never
-    rises above zero; its bound is zero.
-
-    Args:
-        state: at the path's start.
-        toes, rest_length: of the template.
-        steepest: bounds of speed, acceleration and jerk along the path [m/s, m/s^2, m/s^3].
-        step: duration of the path [s].
-        bends: (NUM_EVENTS,) overwritten, by Event.
+    ``steepest`` are those of speed, acceleration and jerk within the path's ``step`` [s]. That of a
+    leg holds where it is longer than l0 / 2, and from below always. REST never rises above zero.
     """
     speed, acceleration, jerk = steepest
     x, y = state[0], abs(state[1]) + speed * step
     rear, front = abs(x - toes[0]), abs(x - toes[1])
     turn = 3.0 * speed * acceleration
-    bends[_TOUCHDOWN] = bends[_VLO] = bends[_PASSED_FRONT_FOOT] = bends[_FALL] = acceleration
-    bends[_APEX] = bends[_BACKWARD] = jerk
-    bends[_BOTTOM] = turn + (rear + y) * jerk
-    bends[_VIRTUAL_BOTTOM] = turn + (0.5 * (rear + front) + y) * jerk
-    bends[_REAR_LIFTOFF] = acceleration + 2.0 * speed * speed / rest_length
-    bends[_FRONT_LIFTOFF] = bends[_REAR_LIFTOFF]
-    bends[_REST] = 0.0
+    bends[Event.TOUCHDOWN] = bends[Event.VLO] = bends[Event.PASSED_FRONT_FOOT] = bends[
+        Event.FALL
+    ] = acceleration
+    bends[Event.APEX] = bends[Event.BACKWARD] = jerk
+    bends[Event.BOTTOM] = turn + (rear + y) * jerk
+    bends[Event.VIRTUAL_BOTTOM] = turn + (0.5 * (rear + front) + y) * jerk
+    bends[Event.REAR_LIFTOFF] = acceleration + 2.0 * speed * speed / rest_length
+    bends[Event.FRONT_LIFTOFF] = bends[Event.REAR_LIFTOFF]
+    bends[Event.REST] = 0.0
 
 
 @inner
 def guard_rate(event: int, path: Array, toes: Array) -> float:
     """Time derivative of a guard where x, y and their first two derivatives are ``path`` (6,)."""
     x, y, u, v = path[0], path[1], path[2], path[3]
-    if event in (_TOUCHDOWN, _FALL):
+    if event in (Event.TOUCHDOWN, Event.FALL):
         return -v
-    if event in (_REAR_LIFTOFF, _FRONT_LIFTOFF):
-        d = x - toes[0 if event == _REAR_LIFTOFF else 1]
+    if event in (Event.REAR_LIFTOFF, Event.FRONT_LIFTOFF):
+        d = x - toes[0 if event == Event.REAR_LIFTOFF else 1]
         return (d * u + y * v) / np.sqrt(d * d + y * y)
-    if event == _APEX:
+    if event == Event.APEX:
         return -path[5]
-    if event in (_BOTTOM, _VIRTUAL_BOTTOM):
-        pivot = toes[0] if event == _BOTTOM else 0.5 * (toes[0] + toes[1])
+    if event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
+        pivot = toes[0] if event == Event.BOTTOM else 0.5 * (toes[0] + toes[1])
         return u * u + v * v + (x - pivot) * path[4] + y * path[5]
-    if event == _BACKWARD:
+    if event == Event.BACKWARD:
         return -path[4]
-    if event == _REST:
+    if event == Event.REST:
         return -2.0 * (u * path[4] + v * path[5])
     return u
 
@@ -222,27 +191,27 @@ def guard_gradient(event: int, state: Array, toes: Array, gradient: Array) -> No
     x, y, u, v = state[0], state[1], state[2], state[3]
     for i in range(7):
         gradient[i] = 0.0
-    if event == _TOUCHDOWN:
+    if event == Event.TOUCHDOWN:
         gradient[1], gradient[6] = -1.0, 1.0
-    elif event in (_REAR_LIFTOFF, _FRONT_LIFTOFF):
-        leg = 0 if event == _REAR_LIFTOFF else 1
+    elif event in (Event.REAR_LIFTOFF, Event.FRONT_LIFTOFF):
+        leg = 0 if event == Event.REAR_LIFTOFF else 1
         d = x - toes[leg]
         length = np.sqrt(d * d + y * y)
         gradient[0], gradient[1], gradient[4 + leg] = d / length, y / length, -d / length
-    elif event == _APEX:
+    elif event == Event.APEX:
         gradient[3] = -1.0
-    elif event in (_BOTTOM, _VIRTUAL_BOTTOM):
-        front = 0.5 if event == _VIRTUAL_BOTTOM else 0.0
+    elif event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
+        front = 0.5 if event == Event.VIRTUAL_BOTTOM else 0.0
         gradient[0], gradient[1], gradient[3] = u, v, y
         gradient[2] = x - (1.0 - front) * toes[0] - front * toes[1]
         gradient[4], gradient[5] = -(1.0 - front) * u, -front * u
-    elif event == _VLO:
+    elif event == Event.VLO:
         gradient[0], gradient[4] = 1.0, -1.0
-    elif event == _PASSED_FRONT_FOOT:
+    elif event == Event.PASSED_FRONT_FOOT:
         gradient[0], gradient[5] = 1.0, -1.0
-    elif event == _FALL:
+    elif event == Event.FALL:
         gradient[1] = -1.0
-    elif event == _REST:
+    elif event == Event.REST:
         gradient[2], gradient[3] = -2.0 * u, -2.0 * v
     else:
         gradient[2] = -1.0

@@ -16,17 +16,7 @@ from template_control.slip.automaton.hybrid import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.guards import COEFFICIENTS, SERIES, Path, all_bends, sample
 from template_control.slip.dynamics.locate import Watch, arm, first_event
-from template_control.slip.dynamics.model import ORDER, Kernel, expand, model_of, steepest
-
-# Numba freezes module-level integers into the compiled code.
-_PLACE_REAR = int(Reset.PLACE_REAR)
-_PLACE_FRONT = int(Reset.PLACE_FRONT)
-_SHIFT = int(Reset.SHIFT)
-_SWAP = int(Reset.SWAP)
-_TOUCHDOWN = int(Event.TOUCHDOWN)
-_BOTTOM = int(Event.BOTTOM)
-_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
-_TIMEOUT = int(Outcome.TIMEOUT)
+from template_control.slip.dynamics.model import ORDER, Kernel, expand, steepest
 
 MAX_SEGMENTS = 96
 MAX_EVENTS = 16
@@ -36,21 +26,7 @@ _EVERY = np.bool_(True)  # Numba would compile the stride once more for a litera
 
 
 class Scratch(NamedTuple):
-    """Arrays a stride is written to; one set a thread, reused from call to call.
-
-    Attributes:
-        cx, cy: (MAX_SEGMENTS, ORDER + 1) polynomials of the path, one row a segment.
-        meta: (MAX_SEGMENTS, 7) start time, duration, node, toes, stiffnesses of a segment.
-        events: (MAX_EVENTS, 8) time, event, node left, node entered, state before the reset.
-        work: (2, 4, ORDER + 1) for the series.
-        path: (COEFFICIENTS,) of a closed-form phase.
-        out, probe: (6,) samples of a path.
-        state, toes: (4,) and (2,) of the section maps.
-        lengths: (3,) of rear and front leg at the last (virtual) bottom, and of the rear leg at the
-            last touchdown [m].
-        stiffness: (2,) of the phase's legs.
-        values, bends, armed: (2, NUM_EVENTS), (NUM_EVENTS,) and (MAX_EDGES,) the guards.
-    """
+    """Arrays a stride is written to; one set a thread, reused: see :func:`new_scratch`."""
 
     cx: Array
     cy: Array
@@ -72,19 +48,20 @@ class Scratch(NamedTuple):
 def new_scratch() -> Scratch:
     """Fresh arrays for one thread."""
     return Scratch(
-        cx=np.zeros((MAX_SEGMENTS, ORDER + 1)),
+        cx=np.zeros((MAX_SEGMENTS, ORDER + 1)),  # polynomials of the path's x, a row a segment
         cy=np.zeros((MAX_SEGMENTS, ORDER + 1)),
-        meta=np.zeros((MAX_SEGMENTS, 7)),
-        events=np.zeros((MAX_EVENTS, 8)),
-        work=np.zeros((2, 4, ORDER + 1)),
-        path=np.zeros(COEFFICIENTS),
-        out=np.zeros(6),
+        meta=np.zeros((MAX_SEGMENTS, 7)),  # start time, duration, node, toes, stiffnesses
+        events=np.zeros((MAX_EVENTS, 8)),  # time, event, nodes left and entered, state before reset
+        work=np.zeros((2, 4, ORDER + 1)),  # of the series
+        path=np.zeros(COEFFICIENTS),  # of a closed-form phase
+        out=np.zeros(6),  # samples of a path
         probe=np.zeros(6),
-        state=np.zeros(4),
+        state=np.zeros(4),  # of the section maps
         toes=np.zeros(2),
+        # Of rear and front leg at the last (virtual) bottom, of the rear leg at touchdown [m].
         lengths=np.zeros(3),
-        stiffness=np.zeros(2),
-        values=np.zeros((2, NUM_EVENTS)),
+        stiffness=np.zeros(2),  # of the phase's legs
+        values=np.zeros((2, NUM_EVENTS)),  # the last three: see Watch
         bends=np.zeros(NUM_EVENTS),
         armed=np.zeros(MAX_EDGES, dtype=np.bool_),
     )
@@ -93,25 +70,39 @@ def new_scratch() -> Scratch:
 @inner
 def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha: float) -> None:
     """Move the ``toes`` as a reset of the automaton says."""
-    if reset == _PLACE_REAR:
+    if reset == Reset.PLACE_REAR:
         toes[0] = state[0] + rest_length * np.cos(alpha)
-    elif reset == _PLACE_FRONT:
+    elif reset == Reset.PLACE_FRONT:
         toes[1] = state[0] + rest_length * np.cos(alpha)
-    elif reset in (_SHIFT, _SWAP):
+    elif reset in (Reset.SHIFT, Reset.SWAP):
         rear = toes[0]
         toes[0] = toes[1]
-        if reset == _SWAP:
+        if reset == Reset.SWAP:
             toes[1] = rear
 
 
 @inner
 def note_lengths(event: int, state: Array, toes: Array, lengths: Array) -> None:
     """Write legs' lengths [m] into ``lengths`` of :class:`Scratch` at a bottom or a touchdown."""
-    if event in (_BOTTOM, _VIRTUAL_BOTTOM):
+    if event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
         for leg in range(2):
             lengths[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
-    elif event == _TOUCHDOWN:
+    elif event == Event.TOUCHDOWN:
         lengths[2] = np.sqrt((state[0] - toes[0]) ** 2 + state[1] ** 2)
+
+
+@inner
+def enter(
+    kernel: Kernel, node: int, toes: Array, controls: Array, height: float, scratch: Scratch
+) -> Watch:
+    """Write the legs' stiffnesses in a node, and watch its guards, with a touchdown height [m]."""
+    s, tables, stiffness = scratch, kernel.tables, scratch.stiffness
+    rear, front = tables.rear[node], tables.front[node]
+    stiffness[0] = controls[rear] if rear >= 0 else 0.0
+    stiffness[1] = controls[front] if front >= 0 else 0.0
+    guards = tables.event[tables.first_edge[node] : tables.first_edge[node + 1]]
+    own = (s.values, s.armed, s.bends, s.out, s.probe)
+    return Watch(guards, toes, kernel.rest_length, height, *own)
 
 
 @inner
@@ -126,36 +117,25 @@ def run_stride(
     """Run the automaton from the kernel's node until a section or a failure.
 
     ``state`` and ``toes`` are overwritten with the final ones. If not to ``record``, only the last
-    segment and event are kept.
-
-    Returns:
-        Outcome, last node (the one entered, where the section was reached), number of segments,
-        number of events, duration [s].
+    segment and event are kept. Returns the Outcome, the last node (the one entered, where the
+    section was reached), the numbers of segments and events, and the duration [s].
     """
-    tables, model, node = kernel.tables, model_of(kernel), kernel.node
-    gravity, rest_length, max_time = model.gravity, model.rest_length, model.max_time
+    tables, node = kernel.tables, kernel.node
+    gravity, rest_length, max_time = kernel.gravity, kernel.rest_length, kernel.max_time
     cx, cy, meta, events, work = scratch[:5]
-    out, probe, stiffness, bends = scratch.out, scratch.probe, scratch.stiffness, scratch.bends
-    values, armed = scratch.values, scratch.armed
+    out, stiffness, bends = scratch.out, scratch.stiffness, scratch.bends
     alpha = controls[0]
     touchdown_height = rest_length * np.sin(alpha)
     time, segments, event_count = 0.0, 0, 0
     entered, event = True, -1
     while time < max_time and segments < MAX_SEGMENTS and event_count < MAX_EVENTS:
-        rear, front = tables.rear[node], tables.front[node]
-        stiffness[0] = controls[rear] if rear >= 0 else 0.0
-        stiffness[1] = controls[front] if front >= 0 else 0.0
-        first_edge = tables.first_edge[node]
-        guards = tables.event[first_edge : tables.first_edge[node + 1]]
-        watch = Watch(
-            guards, toes, rest_length, touchdown_height, values, armed, bends, out=out, probe=probe
-        )
+        watch = enter(kernel, node, toes, controls, touchdown_height, scratch)
         if entered:
             arm(watch, state, event)
             entered = False
         row = segments if record else 0
         px, py = cx[row], cy[row]
-        horizon = expand(state, toes, stiffness, model, px, py, work)
+        horizon = expand(state, toes, stiffness, kernel, px, py, work)
         horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
         all_bends(state, toes, rest_length, steepest(px, py, horizon), horizon, bends)
         path = Path(px, py)
@@ -172,7 +152,7 @@ def run_stride(
         if fired < 0:
             continue
 
-        fired += first_edge
+        fired += tables.first_edge[node]
         outcome, target, event = tables.outcome[fired], tables.target[fired], tables.event[fired]
         row = event_count if record else 0
         events[row, 0], events[row, 1] = time, event
@@ -186,7 +166,7 @@ def run_stride(
             return outcome, (target if target >= 0 else node), segments, event_count, time
         node = target
         entered = True
-    return _TIMEOUT, node, segments, event_count, time
+    return Outcome.TIMEOUT, node, segments, event_count, time
 
 
 def plain(kernel: Kernel) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
@@ -204,8 +184,7 @@ def record_stride(
 ) -> tuple[int, int, int, int, float]:
     """:func:`run_stride` for Python, with every segment and event.
 
-    ``kernel`` is from :func:`plain`, and the arrays of :class:`Scratch` are in a plain tuple too: a
-    compiled function is called with named tuples in twice the time.
+    All are plain tuples (:func:`plain`): a call takes named ones in twice the time.
     """
     tables, numbers = kernel
     named = Kernel(Tables(*tables), *numbers)

@@ -23,9 +23,6 @@ from template_control.slip.dynamics.guards import (
     sample,
 )
 
-_TOUCHDOWN = int(Event.TOUCHDOWN)
-_FALL = int(Event.FALL)
-_BACKWARD = int(Event.BACKWARD)
 _ARMING = 1e-10  # a guard must have been this far below zero before it can fire
 _ROUNDING = 2.2e-16  # of a guard [SI]
 _LOOKS = 2000  # at a guard within a substep: ten do, and only a state that is not finite needs more
@@ -40,14 +37,9 @@ _ZERO = 1e-9  # of l0 (a bracket of no width around a jump holds no root)
 class Watch(NamedTuple):
     """The guards of a phase, and what is kept while they are watched.
 
-    Attributes:
-        events: values of the node's Events, edge by edge.
-        toes, rest_length, touchdown_height: of the phase.
-        values: (2, NUM_EVENTS) the guards at either end of a substep; from :func:`arm`.
-        armed: (MAX_EDGES,) which may fire; from :func:`arm`.
-        bends: (NUM_EVENTS,) bounds of the guards' second derivatives, from
-            :func:`~.guards.all_bends`. With zeros guards are only looked at where substeps end.
-        out, probe: (6,) samples of the path, overwritten.
+    ``events`` are the node's, edge by edge. :func:`arm` writes ``values`` (2, NUM_EVENTS), the
+    guards at either end of a substep, and ``armed`` (MAX_EDGES,), which may fire. ``bends`` are
+    from :func:`~.guards.all_bends`; with zeros guards are only looked at where substeps end.
     """
 
     events: IntArray
@@ -63,18 +55,17 @@ class Watch(NamedTuple):
 
 @inner
 def arm(watch: Watch, state: Array, fired: int) -> None:
-    """Prepare ``watch`` at the start of a phase; its ``values`` and ``armed`` are overwritten.
+    """Prepare ``watch`` for a phase that the event ``fired`` begins, -1 at a stride's start.
 
-    A guard that is zero there does not fire there. Exceptions are forbidden regions, and the
-    touchdown of a foot that is on the ground already, unless the phase begins with a touchdown.
-    ``fired`` is the event that the phase begins with, -1 at the start of a stride.
+    A guard that is zero there does not fire there, but for forbidden regions, and the touchdown of
+    a foot that is on the ground already.
     """
     events, values, armed = watch.events, watch.values, watch.armed
     all_guards(state, watch.toes, watch.rest_length, watch.touchdown_height, values[0])
     for i in range(events.shape[0]):
         e = events[i]
-        lands = e == _TOUCHDOWN and e != fired and values[0, e] <= _ARMING
-        armed[i] = values[0, e] < -_ARMING or e in (_FALL, _BACKWARD) or lands
+        lands = e == Event.TOUCHDOWN and e != fired and values[0, e] <= _ARMING
+        armed[i] = values[0, e] < -_ARMING or e in (Event.FALL, Event.BACKWARD) or lands
 
 
 @inner
@@ -96,11 +87,9 @@ def root(
     tolerance: float,
     watch: Watch,
 ) -> float:
-    """Time within ``bracket`` at which the guard rises through 0, -1 if it does not.
+    """Time within ``bracket`` at which the guard rises through 0, -1 if it does not [s].
 
     Newton's method, then the inverse cubic through the last two points, kept bracketed.
-    The search begins at ``start``; times and ``tolerance`` are in [s]; ``watch.out`` is
-    overwritten.
     """
     toes, rest_length, out = watch.toes, watch.rest_length, watch.out
     lo, hi = bracket
@@ -143,8 +132,7 @@ def root(
 def _clear(g_lo: float, g_hi: float, bend: float, width: float) -> bool:
     """True if a function cannot rise above zero within an interval of a width.
 
-    A function below zero at both ends whose second derivative is at most ``bend``, not below zero,
-    lies below the parabola through its ends that bends down so much.
+    It lies below the parabola through its ends that bends down by its greatest second derivative.
     """
     sag = 0.5 * bend * width * width
     return sag <= _ROUNDING - g_lo - g_hi + 2.0 * np.sqrt(g_lo * g_hi)
@@ -152,10 +140,7 @@ def _clear(g_lo: float, g_hi: float, bend: float, width: float) -> bool:
 
 @inner
 def _comes_near(values: Array, event: int, sag: float) -> bool:
-    """True if :func:`_clear`, with this ``sag``, has to be evaluated for a guard.
-
-    It spares the root: the geometric mean of two values is at least the smaller one.
-    """
+    """True if :func:`_clear` is to be asked: the mean of two values is at least the smaller one."""
     g_lo, g_hi = values[0, event], values[1, event]
     highest = max(g_lo, g_hi)
     return highest >= -_ARMING or sag > -(g_lo + g_hi) - 2.0 * highest
@@ -165,13 +150,11 @@ def _comes_near(values: Array, event: int, sag: float) -> bool:
 def _first_rise(
     kind: int, path: Path, edge: int, span: tuple[float, float], tolerance: float, watch: Watch
 ) -> float:
-    """Time at which a guard first fires within a substep, inf if it does not.
+    """Time at which a watched guard first fires within a substep, inf if it does not [s].
 
     The substep is halved until each part, from the first on, either holds no rise, by the bound of
     the guard's second derivative, or ends above zero. No rise is missed, however short the guard is
-    above or below zero. ``edge`` is an index of the watched events; ``span`` are the substep's
-    ends, where ``watch`` holds the guard, and ``tolerance`` is of the time [s]. ``watch.armed`` is
-    updated, ``watch.out`` is overwritten only if the guard fires.
+    above or below zero. ``span`` are the substep's ends, where ``watch`` holds the guard.
     """
     event, probe = watch.events[edge], watch.probe
     toes, rest_length, height = watch.toes, watch.rest_length, watch.touchdown_height
@@ -187,7 +170,7 @@ def _first_rise(
         if g_lo > _ARMING or not (falls or (rate <= 0.0 and g_end < 0.0)):
             return begin
         armed = False
-    floor = 0.0 if event == _TOUCHDOWN else -_ARMING
+    floor = 0.0 if event == Event.TOUCHDOWN else -_ARMING
     t_hi, g_hi = t_end, g_end
     for _ in range(_LOOKS):
         if t_lo >= t_end:
@@ -226,8 +209,7 @@ def first_event(
     """Index of the first of a node's guards that fires within ``horizon``, and its time [s].
 
     -1 and ``horizon`` if none fires; then ``watch.out`` holds the path there. Guards that come
-    close to zero are looked at every ``substep`` [s] at least; ``tolerance`` is of event times [s].
-    ``watch`` has to be prepared by :func:`arm` at the phase's start; it is updated.
+    close to zero are looked at every ``substep`` [s] at least. :func:`arm` comes before.
     """
     events, values, bends, out = watch.events, watch.values, watch.bends, watch.out
     fired, fired_at = -1, horizon

@@ -19,31 +19,18 @@ from template_control.slip.automaton.hybrid import Automaton, Tables
 from template_control.slip.parameters import SlipParameters
 
 
-class Model(NamedTuple):
-    """The template's physics.
+class Kernel(NamedTuple):
+    """A kind of stride of one template: the packed automaton, the physics, and the first node.
 
     Attributes:
+        tables: of the automaton.
         mass: [kg].
         gravity: into the ground [m/s^2].
         along: gravity along the ground, backward positive [m/s^2].
         assist: forward acceleration that two legs add to their springs' [m/s^2].
         rest_length: l0 [m].
         max_time: a stride that takes longer counts as failed [s].
-    """
-
-    mass: float
-    gravity: float
-    along: float
-    assist: float
-    rest_length: float
-    max_time: float
-
-
-class Kernel(NamedTuple):
-    """A kind of stride of one template: the packed automaton, :class:`Model`, and the first node.
-
-    The model's numbers lie in it next to each other: a tuple more within it would cost a
-    microsecond at every call from Python.
+        node: index of the first node.
     """
 
     tables: Tables
@@ -56,34 +43,29 @@ class Kernel(NamedTuple):
     node: int
 
 
-def kernel_model(parameters: SlipParameters, max_time: float | None = None) -> Model:
-    """``parameters`` as the kernel takes them; ``max_time`` is 20 sqrt(l0/g) by default [s]."""
+def node_kernel(
+    parameters: SlipParameters, automaton: Automaton, node: int = 0, max_time: float | None = None
+) -> Kernel:
+    """The kernel of strides from a node; ``max_time`` is 20 sqrt(l0/g) by default [s]."""
     p = parameters
     limit = 20.0 * np.sqrt(p.rest_length / p.gravity) if max_time is None else max_time
-    return Model(p.mass, *p.gravity_parts, p.assist, p.rest_length, float(limit))
-
-
-@inner
-def model_of(kernel: Kernel) -> Model:
-    """The template of a kernel."""
-    k = kernel
-    return Model(k.mass, k.gravity, k.along, k.assist, k.rest_length, k.max_time)
-
-
-@inner
-def backward(model: Model, stiffness: Array) -> float:
-    """Acceleration along the ground by all but the springs, backward positive [m/s^2]."""
-    if stiffness[0] == 0.0 or stiffness[1] == 0.0:
-        return model.along
-    return model.along - model.assist
+    physics = (p.mass, *p.gravity_parts, p.assist, p.rest_length, float(limit))
+    return Kernel(automaton.tables, *physics, node)
 
 
 def stride_kernel(
     parameters: SlipParameters, stride: str, automaton: Automaton = AUTOMATON
 ) -> Kernel:
-    """The kernel's input for strides of a kind, a key of the automaton's ``starts``."""
-    node = automaton.index[automaton.start(stride).name]
-    return Kernel(automaton.tables, *kernel_model(parameters), node=node)
+    """The kernel of a kind of stride, a key of the automaton's ``starts``."""
+    return node_kernel(parameters, automaton, automaton.index[automaton.start(stride).name])
+
+
+@inner
+def backward(kernel: Kernel, stiffness: Array) -> float:
+    """Acceleration along the ground by all but the springs, backward positive [m/s^2]."""
+    if stiffness[0] == 0.0 or stiffness[1] == 0.0:
+        return kernel.along
+    return kernel.along - kernel.assist
 
 
 ORDER = 16
@@ -98,23 +80,18 @@ def expand(
     state: Array,
     toes: Array,
     stiffness: Array,
-    model: Model,
+    kernel: Kernel,
     cx: Array,
     cy: Array,
     work: Array,
 ) -> float:
-    """Taylor coefficients of the CoM path from ``state``, and the step they are good for.
+    """Write the Taylor coefficients x(t) = sum cx[i] t^i of the CoM's path from ``state``, and y.
 
-    Args:
-        state, toes, stiffness, model: at the start of the path.
-        cx, cy: (ORDER + 1,) overwritten with x(t) = sum cx[i] t^i, and y.
-        work: (2, 4, ORDER + 1) scratch.
-
-    Returns:
-        The step h [s] within which the truncated series are exact to ``TOLERANCE``.
+    Returns the step [s] within which the truncated series are exact to ``TOLERANCE``; ``work`` (2,
+    4, ORDER + 1) is overwritten.
     """
-    mass, gravity, rest_length = model.mass, model.gravity, model.rest_length
-    along = backward(model, stiffness)
+    mass, gravity, rest_length = kernel.mass, kernel.gravity, kernel.rest_length
+    along = backward(kernel, stiffness)
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
     for n in range(ORDER - 1):
         ax = ay = 0.0
@@ -159,8 +136,7 @@ def expand(
 def steepest(cx: Array, cy: Array, step: float) -> tuple[float, float, float]:
     """Bounds of the CoM's speed, acceleration and jerk within ``step`` [m/s, m/s^2, m/s^3].
 
-    They are the series of :func:`expand`'s derivatives with the absolute values of all
-    coefficients; the length of a vector is at most |x| + |y|.
+    The derivatives' series with absolute values; a vector is at most |x| + |y| long.
     """
     acceleration = jerk = 0.0
     squared = step * step

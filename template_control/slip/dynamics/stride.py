@@ -17,21 +17,16 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Edge
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
 from template_control.slip.dynamics.kernel import new_scratch, plain, record_stride
-from template_control.slip.dynamics.model import Kernel, kernel_model
+from template_control.slip.dynamics.model import Kernel, node_kernel
 from template_control.slip.parameters import SlipParameters
 
 _OUTCOMES = tuple(Outcome)
 
 
 class FiredEvent(NamedTuple):
-    """A guard that fired.
+    """A guard that fired: when since the stride's start [s], and between which nodes.
 
-    Attributes:
-        time: since the start of the stride [s].
-        event: which guard.
-        source, target: node left, and node entered ("" where the stride failed).
-        state: (4,) x, y, dx/dt, dy/dt [m, m/s] at the event.
-        reset: what happened to the toes then.
+    ``target`` is "" where the stride failed; ``state`` (4,) is x, y, dx/dt, dy/dt [m, m/s] then.
     """
 
     time: float
@@ -144,10 +139,7 @@ def controls(
 
 
 def finite(name: str, values: ArrayLike, size: int) -> Array:
-    """Copy numbers into a new (size,) array.
-
-    A ParameterError, which calls them ``name``, if their shape is another or one is not finite.
-    """
+    """Copy numbers into a new (size,) array; a ParameterError that calls them ``name`` if bad."""
     array = np.array(values, dtype=float)
     if array.shape != (size,):
         raise ParameterError(f"{name} has shape {array.shape}: give {size} numbers")
@@ -158,10 +150,9 @@ def finite(name: str, values: ArrayLike, size: int) -> Array:
 
 
 class StrideSimulator:
-    """Simulates strides on the exact model, one after the other.
+    """Simulates strides on the exact model, one after the other, on one thread.
 
-    A stride is given up after ``max_time`` [s], by default 20 sqrt(l0/g). One object serves one
-    thread: it owns the compiled kernel's scratch arrays.
+    A stride is given up after ``max_time`` [s], by default 20 sqrt(l0/g).
     """
 
     def __init__(
@@ -172,7 +163,7 @@ class StrideSimulator:
     ) -> None:
         self.parameters = parameters
         self.automaton = automaton
-        self._model = kernel_model(parameters, max_time)
+        self._kernel = node_kernel(parameters, automaton, max_time=max_time)
         self._scratch = new_scratch()
         self._plain = tuple(self._scratch)
         self._names = tuple(node.name for node in automaton.nodes)
@@ -184,8 +175,7 @@ class StrideSimulator:
 
     def kernel(self, start: str) -> Kernel:
         """The compiled stride's input for strides from a node."""
-        index = self.automaton.index[start]
-        return Kernel(self.automaton.tables, *self._model, node=index)
+        return self._kernel._replace(node=self.automaton.index[start])
 
     def run(
         self,
@@ -194,10 +184,7 @@ class StrideSimulator:
         u: Array,
         toes: Sequence[float] | Array = (0.0, 0.0),
     ) -> Stride:
-        """Simulate one stride from the node ``start``, usually from ``STRIDE_START``.
-
-        Arguments and errors as for :func:`simulate_stride`.
-        """
+        """Simulate one stride; arguments and errors as for :func:`simulate_stride`."""
         if start not in self._kernels:
             raise ParameterError(
                 f"there is no node {start!r}: give one of {', '.join(self.automaton.index)}"

@@ -21,16 +21,8 @@ from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Reset, Slot
 from template_control.slip.dynamics.guards import SERIES, Path, guard_gradient, sample
 from template_control.slip.dynamics.kernel import Scratch
-from template_control.slip.dynamics.model import ORDER, Kernel, Model, model_of
+from template_control.slip.dynamics.model import ORDER, Kernel
 
-# Numba freezes module-level integers into the compiled code.
-_PLACE_REAR = int(Reset.PLACE_REAR)
-_PLACE_FRONT = int(Reset.PLACE_FRONT)
-_SHIFT = int(Reset.SHIFT)
-_SWAP = int(Reset.SWAP)
-_TOUCHDOWN = int(Event.TOUCHDOWN)
-_BOTTOM = int(Event.BOTTOM)
-_VIRTUAL_BOTTOM = int(Event.VIRTUAL_BOTTOM)
 _ALPHA = 3 + int(Slot.TOUCHDOWN_ANGLE)
 
 COLUMNS = 3 + NUM_SLOTS
@@ -41,21 +33,7 @@ _TOE, _KAPPA = 4, 6
 
 
 class Tangents(NamedTuple):
-    """Arrays that tangents are written to; one set a thread, reused from call to call.
-
-    Attributes:
-        state: (4, COLUMNS) derivatives of x, y, dx/dt, dy/dt.
-        toes: (2, COLUMNS) of the x of rear and front toe.
-        lengths: (3, COLUMNS) of the lengths of rear and front leg at the (virtual) bottom, and of
-            the rear leg at touchdown.
-        flow: (4, _INPUTS) of a phase's final state by what it begins with.
-        leg: (6, ORDER - 1) series of a leg: r^2, r^-3, 1/r, d_x/r^3, d_x^2/r^3, d_x d_y/r^3.
-        force: (2, 3, ORDER - 1) series of G of each leg: xx, xy, yy.
-        pull: (2, 2, ORDER - 1) series of F / m of each leg: x, y.
-        series: (2, ORDER + 1, _INPUTS) of dx and dy by input.
-        guard: (7,) gradient of a guard, see :func:`~.guards.guard_gradient`.
-        carried: (4,) a column of ``state`` in the making.
-    """
+    """Arrays that tangents are written to; one set a thread, reused: see :func:`new_tangents`."""
 
     state: Array
     toes: Array
@@ -72,16 +50,18 @@ class Tangents(NamedTuple):
 def new_tangents() -> Tangents:
     """Fresh arrays for one thread."""
     return Tangents(
-        state=np.zeros((4, COLUMNS)),
-        toes=np.zeros((2, COLUMNS)),
+        state=np.zeros((4, COLUMNS)),  # derivatives of x, y, dx/dt, dy/dt
+        toes=np.zeros((2, COLUMNS)),  # of the x of rear and front toe
+        # Of rear and front leg at the (virtual) bottom, and of the rear leg at touchdown.
         lengths=np.zeros((3, COLUMNS)),
-        flow=np.zeros((4, _INPUTS)),
+        flow=np.zeros((4, _INPUTS)),  # of a phase's final state by what it begins with
+        # Series of a leg: r^2, r^-3, 1/r, d_x/r^3, d_x^2/r^3, d_x d_y/r^3.
         leg=np.zeros((6, ORDER - 1)),
-        force=np.zeros((2, 3, ORDER - 1)),
-        pull=np.zeros((2, 2, ORDER - 1)),
-        series=np.zeros((2, ORDER + 1, _INPUTS)),
-        guard=np.zeros(7),
-        carried=np.zeros(4),
+        force=np.zeros((2, 3, ORDER - 1)),  # of G of each leg: xx, xy, yy
+        pull=np.zeros((2, 2, ORDER - 1)),  # of F / m of each leg: x, y
+        series=np.zeros((2, ORDER + 1, _INPUTS)),  # of dx and dy by input
+        guard=np.zeros(7),  # gradient of a guard
+        carried=np.zeros(4),  # a column of `state` in the making
     )
 
 
@@ -99,7 +79,7 @@ def _leg_series(
     leg: int,
     toe: float,
     stiffness: float,
-    model: Model,
+    kernel: Kernel,
     cx: Array,
     cy: Array,
     tangents: Tangents,
@@ -107,7 +87,7 @@ def _leg_series(
     """Write a leg's G and F / m as series along a path ``cx``, ``cy``."""
     squared, cube, inverse, tilt, xx, xy = tangents.leg
     force, pull = tangents.force[leg], tangents.pull[leg]
-    rest_length, share = model.rest_length, stiffness / model.mass
+    rest_length, share = kernel.rest_length, stiffness / kernel.mass
     start = cx[0]
     cx[0] = start - toe  # the series of d_x, until the end of this function
     for n in range(ORDER - 1):
@@ -128,8 +108,8 @@ def _leg_series(
         force[1, n] = -share * rest_length * xy[n]
         force[2, n] = share * (stretch - rest_length * (inverse[n] - xx[n]))
     for n in range(ORDER - 1):
-        pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / model.mass
-        pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / model.mass
+        pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / kernel.mass
+        pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / kernel.mass
     cx[0] = start
 
 
@@ -144,10 +124,9 @@ def _flight(step: float, flow: Array) -> None:
 
 @inner
 def _stance(rear: bool, front: bool, step: float, tangents: Tangents) -> None:
-    """Write the derivatives of a phase's end by its beginning into ``tangents.flow``.
+    """Write the derivatives of a phase's end, after ``step`` [s], by its beginning.
 
-    ``rear`` and ``front`` say which legs are on the ground; :func:`_leg_series` has written their
-    series. ``step`` is the duration of the phase [s].
+    ``rear`` and ``front`` say which legs are on the ground; :func:`_leg_series` comes before.
     """
     force, pull, flow = tangents.force, tangents.pull, tangents.flow
     dx, dy = tangents.series
@@ -224,8 +203,7 @@ def _fire(
 ) -> None:
     """Move the tangents' state from the event's time to where the guard is zero.
 
-    ``at`` (6,) are x, y and their first and second derivatives at the event. Where the event has
-    ``lengths``, they are written too.
+    ``at`` (6,) are x, y and their first and second derivatives at the event.
     """
     g, state, moved = tangents.guard, tangents.state, tangents.toes
     guard_gradient(event, at, toes, g)
@@ -239,10 +217,10 @@ def _fire(
         time = -change / rate
         for i in range(4):
             state[i, c] += at[2 + i] * time
-    if event in (_BOTTOM, _VIRTUAL_BOTTOM):
+    if event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
         _lengthen(0, 0, at, toes, tangents)
         _lengthen(1, 1, at, toes, tangents)
-    elif event == _TOUCHDOWN:
+    elif event == Event.TOUCHDOWN:
         _lengthen(2, 0, at, toes, tangents)
 
 
@@ -252,14 +230,14 @@ def _reset(reset: int, alpha: float, rest_length: float, tangents: Tangents) -> 
     state, toes = tangents.state, tangents.toes
     for c in range(COLUMNS):
         placed = state[0, c] - (rest_length * np.sin(alpha) if c == _ALPHA else 0.0)
-        if reset == _PLACE_REAR:
+        if reset == Reset.PLACE_REAR:
             toes[0, c] = placed
-        elif reset == _PLACE_FRONT:
+        elif reset == Reset.PLACE_FRONT:
             toes[1, c] = placed
-        elif reset in (_SHIFT, _SWAP):
+        elif reset in (Reset.SHIFT, Reset.SWAP):
             rear = toes[0, c]
             toes[0, c] = toes[1, c]
-            if reset == _SWAP:
+            if reset == Reset.SWAP:
                 toes[1, c] = rear
 
 
@@ -272,14 +250,12 @@ def stride_tangents(
     scratch: Scratch,
     tangents: Tangents,
 ) -> None:
-    """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded.
+    """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded in ``scratch``.
 
-    ``segments`` and ``events`` are the numbers of recorded ones in ``scratch``. ``state``, ``toes``
-    and ``lengths`` of ``tangents`` are overwritten with the derivatives at the stride's end by
-    dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
+    ``state``, ``toes`` and ``lengths`` of ``tangents`` are overwritten with the derivatives at the
+    stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
     """
-    tables, model = kernel.tables, model_of(kernel)
-    alpha, rest_length = controls[0], model.rest_length
+    tables, alpha, rest_length = kernel.tables, controls[0], kernel.rest_length
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
     tangents.lengths[:] = np.nan
@@ -290,9 +266,9 @@ def stride_tangents(
         step, node = meta[1], int(meta[2])
         rear, front = tables.rear[node], tables.front[node]
         if rear >= 0:
-            _leg_series(0, meta[3], meta[5], model, cx, cy, tangents)
+            _leg_series(0, meta[3], meta[5], kernel, cx, cy, tangents)
         if front >= 0:
-            _leg_series(1, meta[4], meta[6], model, cx, cy, tangents)
+            _leg_series(1, meta[4], meta[6], kernel, cx, cy, tangents)
         if rear >= 0 or front >= 0:
             _stance(rear >= 0, front >= 0, step, tangents)
         else:

@@ -25,7 +25,6 @@ from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 _MOST = 100_000  # steps
-_SECTION = int(Outcome.SECTION)
 _WINDOW = 5
 _THERE = 0.01  # as near as this, it need not come nearer
 _SHRINKS = 0.95  # of the distance half-way must be left at most: no other gait, no cycle
@@ -85,13 +84,10 @@ def _steps(
     scratch: Scratch,
     result: Array,
 ) -> tuple[int, bool]:
-    """Number of steps (at most ``limit``), and True if they lead to ``goal`` (2,) = y, phi.
-
-    ``z`` (3,) is overwritten with the last VLO state.
-    """
+    """Number of steps from ``z``, overwritten by the last VLO, and whether they lead to y, phi."""
     early = middle = late = 0.0
     for step in range(limit):
-        if one_stride(kernel, None, z, controls, scratch, result) != _SECTION:
+        if one_stride(kernel, None, z, controls, scratch, result) != Outcome.SECTION:
             return step, False
         for i in range(3):
             z[i] = result[i]

@@ -31,7 +31,7 @@ class Kind(Enum):
 def classify(eigenvalues: ComplexArray, tolerance: float = 0.0) -> Kind:
     """STABLE if all eigenvalues lie within the unit circle, UNSTABLE if none does, SADDLE between.
 
-    NEUTRAL if the largest lies on the circle to the ``tolerance`` to which they are known.
+    NEUTRAL if the largest lies on the circle to the ``tolerance``.
     """
     sizes = np.abs(eigenvalues)
     if abs(sizes.max() - 1.0) < tolerance:
@@ -43,11 +43,9 @@ def classify(eigenvalues: ComplexArray, tolerance: float = 0.0) -> Kind:
 
 
 def shell_eigenvalues(jacobian: Array, energy_gradient: Array) -> ComplexArray:
-    """Eigenvalues of a passive return map within its energy shell.
+    """Eigenvalues of a passive return map (n, n) within its energy shell, of a gradient (n,).
 
-    A passive stride conserves energy, so one eigenvalue of the whole map is 1; it says nothing
-    about stability and is left out. ``jacobian`` (n, n) is the map's at a fixed point; the gradient
-    (n,) that of the energy at the section.
+    Energy is conserved, so one eigenvalue of the whole map is 1: it says nothing, and is left out.
     """
     shell = np.linalg.svd(energy_gradient[None, :])[2][1:].T
     return np.linalg.eigvals(shell.T @ jacobian @ shell).astype(np.complex128)
@@ -125,14 +123,11 @@ class BranchPoint:
 
 
 class Equations(NamedTuple):
-    """A family's equations at X: ``residual`` (n,), zero on the branch, and its Jacobian.
+    """A family's equations at X, which are zero on the branch."""
 
-    ``jacobian`` (n, n + 1) is in scaled X; ``valid`` says whether the stride ended at its section.
-    """
-
-    residual: Array
-    jacobian: Array
-    valid: bool
+    residual: Array  # (n,)
+    jacobian: Array  # (n, n + 1) in scaled X
+    valid: bool  # whether the stride ended at its section
 
 
 class Branch(ABC):
@@ -167,8 +162,7 @@ class Branch(ABC):
     def correct(self, x: Array, direction: Array | None = None) -> Array:
         """X (n + 1,) of the gait nearest a guess, in the plane through it normal to a direction.
 
-        ``direction`` (n + 1,) is in scaled coordinates; None: any X will do, and it is changed as
-        little as possible. A GaitError if Newton's method does not converge.
+        The direction is in scaled coordinates; None: any X will do. A GaitError without a gait.
         """
         start = x.copy()
         x = x.copy()

@@ -35,29 +35,19 @@ _CONTROL_COST = (5.0, 2.0, 2.0, 2.0)
 
 
 class Figures(NamedTuple):
-    """A gait's figures.
+    """A gait's figures."""
 
-    Attributes:
-        closed: largest absolute eigenvalue of the walk under the LQR's four controls.
-        without: the same with the three of the paper.
-        passive: largest absolute eigenvalue of the passive map.
-        authority: least singular value of the controls' Jacobian: where it vanishes, one direction
-            of the state is out of their reach.
-        double_stance: share of the step.
-    """
-
-    closed: float
-    without: float
-    passive: float
+    closed: float  # largest absolute eigenvalue of the walk under the LQR's four controls
+    without: float  # the same with the three of the paper
+    passive: float  # largest absolute eigenvalue of the passive map
+    # Least singular value of the controls' Jacobian: where it vanishes, one direction of the state
+    # is out of their reach.
     authority: float
-    double_stance: float
+    double_stance: float  # share of the step
 
 
 def gait_figures(gait: WalkingGait) -> Figures:
-    """Figures of a gait with push-off, on the reference template.
-
-    A GaitError if no control holds it.
-    """
+    """Figures of a gait with push-off; a GaitError if no control holds it."""
     a, b = vlo_jacobians(gait)
     closed = _controlled(a, b)
     if not np.isfinite(closed):
@@ -147,11 +137,7 @@ class Member(NamedTuple):
 
 
 def search_family(spacing: float = _SPACING, settling: int = _SETTLING) -> tuple[list[Member], ...]:
-    """Family of walking gaits by speed: each chain's members, from the slowest to the fastest.
-
-    They are on the reference template. ``spacing`` is of a chain's speeds at VLO [m/s],
-    ``settling`` are rounds of each smoothing. A GaitError if a chain leaves the surface of gaits.
-    """
+    """Family of walking gaits by speed: each chain's members, from the slowest to the fastest."""
     return tuple(_search(np.array(rough), spacing, settling) for rough in (_SLOW, _FAST))
 
 

@@ -125,20 +125,13 @@ def _kind(gait: Gait) -> str:
 
 
 def control_units(gait: Gait) -> tuple[list[int], Array]:
-    """Slots (c,) of a walking step's controls, and their units (c,): 1 rad, k0 for stiffnesses.
-
-    A stride of one's own is taken for the paper's.
-    """
+    """Slots (c,) of a walking step's controls, and their units (c,): 1 rad, k0 for stiffnesses."""
     slots = [int(slot) for slot in WALKING_SLOTS[_kind(gait)]]
     return slots, np.array([1.0, *[gait.parameters.leg_stiffness] * (len(slots) - 1)])
 
 
 def vlo_jacobians(gait: Gait) -> tuple[Array, Array]:
-    """Jacobians of the exact VLO map at a gait: A (3, 3) in z, B (3, c) in its controls.
-
-    Columns of B are the touchdown angle [1/rad], kappa_1 / k0, kappa_2 / k0 and, in steps with
-    push-off, kappa_p / k0.
-    """
+    """Jacobians of the exact VLO map at a gait: A (3, 3) in z, B (3, c) in control units."""
     linear = ReturnMap(gait.parameters, _kind(gait)).linearise(gait.state, gait.controls)
     slots, units = control_units(gait)
     return linear.state_jacobian, linear.control_jacobian[:, slots] * units
@@ -171,10 +164,7 @@ def _misses(step: ReturnMap, z: Array, u: Array) -> tuple[float, float]:
 def root(
     function: Callable[[float], float], ends: tuple[float, float], xtol: float, rtol: float
 ) -> float | None:
-    """Zero of a function of different signs at two ends; None if it is NaN somewhere between.
-
-    ``xtol`` and ``rtol`` are the absolute and the relative accuracy.
-    """
+    """Zero of a function of different signs at two ends; None if it is NaN somewhere between."""
     try:
         return float(brentq(function, *ends, xtol=xtol, rtol=rtol))
     except ValueError:
@@ -241,11 +231,7 @@ def gait_at(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float
 def find_gait_at(
     parameters: SlipParameters, touchdown_angle: float, vlo_speed: float
 ) -> WalkingGait | None:
-    """Gait of :func:`gait_at`, or None if there is none.
-
-    ``touchdown_angle`` is alpha, from the ground to the leg [rad], ``vlo_speed`` dx/dt at VLO
-    [m/s].
-    """
+    """Gait of :func:`gait_at`, or None if there is none."""
     k0, l0 = parameters.leg_stiffness, parameters.rest_length
     u = controls(touchdown_angle, k0, k0)
     heights = np.linspace(l0 * np.sin(touchdown_angle) + 1e-5 * l0, l0 * (1 - 1e-5), _SCAN)
@@ -315,10 +301,7 @@ _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
 class GaitFamily(Generic[G]):
-    """The gaits that a planner's targets stand for, which are those with their speeds.
-
-    ``gait`` is the planner's own; ``others`` says which gaits any of them may give way to.
-    """
+    """The gaits that a planner's targets stand for: its own, and others with their speeds."""
 
     def __init__(self, gait: G, others: Others[G]) -> None:
         self._known, self._others = [gait], others
@@ -329,10 +312,9 @@ class GaitFamily(Generic[G]):
         return self._known[0]
 
     def towards(self, present: G, target: ArrayLike | None) -> tuple[G, bool]:
-        """The gait with the target's speed at the section, or the nearest there is.
+        """The gait with the speed of a target (n,), or the nearest; and whether it has that speed.
 
-        The ``present`` one is kept where it has that speed. Of the target (n,) at the section dx/dt
-        counts [m/s]; None: the present gait's. Returns the gait, and whether it has that speed.
+        The ``present`` one is kept where it has it, or where there is no target.
         """
         if target is None:
             return present, True

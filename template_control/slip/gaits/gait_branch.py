@@ -133,11 +133,7 @@ class Family(Branch):
 def energy_gradient(
     section: Section, parameters: SlipParameters, z: Array, stiffness: float
 ) -> tuple[Array, float]:
-    """Derivatives of :meth:`Section.energy` at ``z`` (n,): (n,) by z, and by the stiffness [J m/N].
-
-    ``section`` is VLO, where the stance leg is vertical and as long as the CoM is high, or APEX;
-    ``stiffness`` is the stance leg's [N/m].
-    """
+    """Derivatives of :meth:`Section.energy` at VLO or apex: (n,) by z, and by the stiffness."""
     p = parameters
     compression = p.rest_length - z[1] if section.event is Event.VLO else 0.0
     gradient = p.mass * np.array([z[0], p.gravity, *z[2:]])

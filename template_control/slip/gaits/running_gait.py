@@ -71,11 +71,9 @@ def running_speeds(parameters: SlipParameters, stride: str = StrideKind.RUN) -> 
 
 
 def suited_height(relative_speed: float) -> float:
-    """Height of the apex over l0 that suits dx/dt over sqrt(g l0).
-
-    The lower the apex, the less the knees bend and the smaller their torques. A slow run needs a
-    higher one to leave the ground, and a hop one from which it falls by 1.5 % of l0.
-    """
+    """Height of the apex over l0 that suits dx/dt over sqrt(g l0)."""
+    # The lower the apex, the less the knees bend and the smaller their torques. A slow run needs a
+    # higher one to leave the ground, and a hop one from which it falls by 1.5 % of l0.
     if abs(relative_speed) < _SLOWEST - _SAME:
         still, fast = _HOPS
         return still + (fast - still) * (relative_speed / _SLOWEST) ** 2
@@ -83,11 +81,9 @@ def suited_height(relative_speed: float) -> float:
 
 
 def suited_stiffness(relative_speed: float) -> float:
-    """k l0 / (m g) that suits dx/dt over sqrt(g l0).
-
-    The stiffer the leg, the less the knee bends; a leg that is too stiff for a slow run leaves it
-    no flight, and its apexes alternate. Below the slowest run it is that one's.
-    """
+    """k l0 / (m g) that suits dx/dt over sqrt(g l0); below the slowest run it is that one's."""
+    # The stiffer the leg, the less the knee bends; a leg that is too stiff for a slow run leaves it
+    # no flight, and its apexes alternate.
     relative_speed = max(relative_speed, _SLOWEST)
     return float(1.65 + (48.8 - 14.3 * relative_speed) * relative_speed)
 

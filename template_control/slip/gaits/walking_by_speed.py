@@ -42,10 +42,8 @@ def nearest_gait(parameters: SlipParameters, vlo_speed: float, guess: Array) -> 
     """The gait with a speed at VLO [m/s] that is nearest a guess, in steps with push-off.
 
     At the next VLO of a symmetric gait dy/dt is zero and the height the same. Of all changes of the
-    guess that make it so, the method takes the least, with exact derivatives. So it does not mind
-    where gaits of one stiffness and angle turn back, or where other strides cross them. ``guess``
-    (3,) is ln of k l0 / (m g), alpha [rad], y / l0 at VLO; the template's k0 is not used. A
-    GaitError if there is none near it.
+    guess (3,), :func:`coordinates`, that make it so, the least is taken. So it does not mind where
+    gaits of one stiffness and angle turn back, or where other strides cross them.
     """
     p, step = parameters, ReturnMap(parameters)
     unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
@@ -102,23 +100,13 @@ _ROUNDING = 1e-6  # of a centimetre per second
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """Gaits at knots; between them is the gait nearest the monotone (PCHIP) interpolation.
+    """Gaits at n knots; between them is the gait nearest the monotone (PCHIP) interpolation."""
 
-    Units are l0, sqrt(l0 / g) and m g.
-
-    Attributes:
-        vlo_speed: (n,) dx/dt at VLO over sqrt(g l0), rising.
-        stiffness: (n,) k l0 / (m g).
-        touchdown_angle: (n,) alpha [rad].
-        height: (n,) y at VLO over l0.
-        mean_speed: (n,) of the whole step over sqrt(g l0), rising.
-    """
-
-    vlo_speed: Array
-    stiffness: Array
-    touchdown_angle: Array
-    height: Array
-    mean_speed: Array
+    vlo_speed: Array  # dx/dt at VLO over sqrt(g l0), rising
+    stiffness: Array  # k l0 / (m g)
+    touchdown_angle: Array  # alpha [rad]
+    height: Array  # y at VLO over l0
+    mean_speed: Array  # of the whole step over sqrt(g l0), rising
 
     @cached_property
     def _curve(self) -> PchipInterpolator:
@@ -133,11 +121,7 @@ class Chain:
         )
 
     def gait(self, parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
-        """The gait with a speed at VLO [m/s]; beyond the chain the nearest end's coordinates serve.
-
-        It has its own stiffness, not the template's k0. A GaitError if there is none near the
-        curve.
-        """
+        """The gait with a speed at VLO [m/s]; beyond the chain that nearest to its end."""
         speed = np.clip(vlo_speed / parameters.speed_unit, self.vlo_speed[0], self.vlo_speed[-1])
         return nearest_gait(parameters, vlo_speed, self._curve(speed))
 
@@ -273,11 +257,7 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
 
 
 def other_walks(gait: WalkingGait) -> tuple[float, float, Callable[..., WalkingGait]]:
-    """See :data:`~.gait.Others`.
-
-    The paper's steps keep the stiffness; those with push-off are the family's by speed, on the
-    branch of the present gait.
-    """
+    """See :data:`~.gait.Others`: with push-off the family's by speed, on the branch of the gait."""
     if gait.stride in _PAPER:
         return *speed_range(gait.parameters), walking_gait
     chain = walking_by_speed().chain_of(gait)

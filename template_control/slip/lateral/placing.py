@@ -165,14 +165,9 @@ def lateral_aim(
 
 
 def before_turn(aim: LateralAim, lateral: LateralGait, turn: float) -> LateralAim:
-    """An aim in the axes so far, where they turn before that foot lands.
+    """An aim of the axes after a turn to the left [rad], in those so far, to the first order.
 
-    To the first order in the angle: what is further ahead is further to the side before.
-
-    Args:
-        aim: in the axes after the turn.
-        lateral: the gait's step map.
-        turn: to the left [rad].
+    What is further ahead is further to the side before.
     """
     to_left = lateral.length * turn
     return aim._replace(
@@ -186,9 +181,8 @@ def before_turn(aim: LateralAim, lateral: LateralGait, turn: float) -> LateralAi
 def pivot(contact: Any, com: Any, rolling: Any) -> Any:
     """y of the point about which the CoM falls, of a foot that rolls on the ground [m].
 
-    ``contact`` is y of the foot's contact, ``com`` that of the CoM [m]; ``rolling`` is by how much
-    the contact moves per way of the CoM, the foot's radius over the leg's length. From the pivot,
-    which rests, the CoM is 1 / (1 - rolling) times as far away as from the contact.
+    ``rolling`` is by how much the contact moves per way of the CoM, the foot's radius over the
+    leg's length: from the pivot, which rests, the CoM is 1 / (1 - rolling) times as far away.
     """
     return (contact - rolling * com) / (1.0 - rolling)
 

@@ -35,12 +35,7 @@ REAR_BOTTOM, FRONT_BOTTOM, REAR_TOUCHDOWN = 4, 5, 6
 
 
 class MapWorkspace(NamedTuple):
-    """Arrays of a map and of its derivatives; one set a thread.
-
-    Attributes:
-        scratch: of strides.
-        tangents: of their derivatives.
-    """
+    """Arrays of strides and of their derivatives; one set a thread."""
 
     scratch: Scratch
     tangents: Tangents
@@ -59,10 +54,7 @@ class Derivatives(NamedTuple):
 
 
 def closed_form(kind: MapKind) -> int | None:
-    """``kind`` as the compiled maps take it: its value, or None for the exact map.
-
-    None is a type of its own, so that only the maps which are asked for are compiled.
-    """
+    """``kind`` as the compiled maps take it; None for the exact one is compiled by itself."""
     return None if kind is MapKind.EXACT else int(kind)
 
 
@@ -106,16 +98,9 @@ def one_stride(
 ) -> int:
     """One stride from section to section; returns the Outcome's value.
 
-    Args:
-        kernel: automaton, template and the stride's first node.
-        kind: from :func:`closed_form`.
-        z: (3,) dx/dt, y, dy/dt at the section [m/s, m, m/s]; dy/dt is 0 at apex. Within a stride
-            (6,): also x of CoM, rear and front toe [m].
-        controls: (NUM_SLOTS,) u by Slot.
-        scratch: overwritten.
-        result: (RESULTS,) overwritten: dx/dt, y, dy/dt at the next section, the distance
-            covered [m], lengths of rear and front leg at the (virtual) bottom and of the rear leg
-            at touchdown [m], NaN if there was none.
+    ``z`` (3,) are dx/dt, y, dy/dt at the section [m/s, m, m/s], dy/dt is 0 at apex; within a stride
+    (6,): also x of CoM, rear and front toe [m]. ``result`` (RESULTS,) is overwritten; lengths are
+    NaN of legs that had no bottom or touchdown. ``kind`` is from :func:`closed_form`.
     """
     _begin(z, scratch)
     outcome = _stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
@@ -133,10 +118,7 @@ def map_many(
     result: Array,
     outcome: IntArray,
 ) -> None:
-    """As :func:`one_stride`, stride by stride: (n, 3) ``z``, (n, NUM_SLOTS) ``controls``.
-
-    ``result`` (n, RESULTS) and ``outcome`` (n,), values of the Outcomes, are overwritten.
-    """
+    """As :func:`one_stride`, for each row of all arrays; ``outcome`` (n,) is overwritten too."""
     for i in range(z.shape[0]):
         outcome[i] = one_stride(kernel, kind, z[i], controls[i], scratch, result[i])
 
@@ -210,9 +192,8 @@ def section_jacobian(
     """:func:`one_stride` with its derivatives, event times included.
 
     Those of the exact map are exact to rounding (:mod:`~.dynamics.tangent`), those of a closed
-    form to about 1e-9 of the value (central differences). ``columns`` (c,) are differentiated by:
-    0 to 2 the state, 3 + slot the controls. ``work`` and ``found`` are overwritten; ``z`` and
-    ``controls`` are what they were afterwards.
+    form to about 1e-9 of the value (central differences). ``columns`` (c,) are what to
+    differentiate by: 0 to 2 the state, 3 + slot the controls.
     """
     if kind is None:
         return _tangents(kernel, z, controls, columns, work, found)

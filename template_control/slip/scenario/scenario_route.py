@@ -44,29 +44,17 @@ def _leads_to(kind: str) -> Section:
 
 @dataclass(frozen=True)
 class _Progress:
-    """Progress of a run in its scenario.
+    """Progress of a run in its scenario."""
 
-    Attributes:
-        speed: of the profile where the segment begins [m/s].
-        began: when that was, None before the run [s].
-        index: of the segment.
-        strides: done in the segment, transitions not counted.
-        duration: of the last stride of each kind [s].
-        last: kind of the stride under way, and when it began; None at the start.
-        walking: the walk has come to its speed since the last stand.
-        took: how long it took, None if it follows from the times [s].
-        over: past the last segment.
-    """
-
-    speed: float
-    began: float | None = None
-    index: int = 0
-    strides: int = 0
-    duration: Mapping[str, float] = field(default_factory=dict)
-    last: tuple[str, float] | None = None
-    walking: bool = True
-    took: float | None = None
-    over: bool = False
+    speed: float  # of the profile where the segment begins [m/s]
+    began: float | None = None  # when that was, None before the run [s]
+    index: int = 0  # of the segment
+    strides: int = 0  # done in the segment, transitions not counted
+    duration: Mapping[str, float] = field(default_factory=dict)  # of each kind's last stride [s]
+    last: tuple[str, float] | None = None  # kind of the stride under way, and when it began
+    walking: bool = True  # the walk has come to its speed since the last stand
+    took: float | None = None  # how long the stride took, None if it follows from the times [s]
+    over: bool = False  # past the last segment
 
     @property
     def kind(self) -> str:

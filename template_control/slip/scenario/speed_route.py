@@ -56,23 +56,14 @@ class GaitChangeOptions(Checked):
 
 
 class _Way(NamedTuple):
-    """Progress on the route.
+    """Progress on the route."""
 
-    Attributes:
-        began: time of the last section [s].
-        took: duration of the last stride of a gait, or a guess [s].
-        stride: kind of the one under way, "" before the first.
-        runs: it has begun to change to a run, or it runs.
-        since: time since which the trunk leans forward for a run, or rises after one [s].
-        reference: speed wanted of a run, on its way to the wanted one [m/s].
-    """
-
-    began: float
-    took: float
-    stride: str = ""
-    runs: bool = False
-    since: float = -np.inf
-    reference: float = 0.0
+    began: float  # time of the last section [s]
+    took: float  # duration of the last stride of a gait, or a guess [s]
+    stride: str = ""  # kind of the one under way
+    runs: bool = False  # it has begun to change to a run, or it runs
+    since: float = -np.inf  # since then the trunk leans forward for a run, or rises after one [s]
+    reference: float = 0.0  # speed wanted of a run, on its way to the wanted one [m/s]
 
 
 class SpeedRoute:
@@ -258,11 +249,7 @@ class SpeedRoute:
         return StrideGoal(stride, np.array([speed, height]), speed, then=StrideKind.RUN)
 
     def _wanted(self, time: float) -> float:
-        """The wanted mean speed [m/s].
-
-        Raises:
-            ScenarioError: if the function does not say one.
-        """
+        """The wanted mean speed [m/s]; a ScenarioError if the function does not say one."""
         kind = float if self.changes.hop else NotNegative
         found = check(f"the wanted speed at {time:g} s", self._speed(time), kind, ScenarioError)
         return float(found)

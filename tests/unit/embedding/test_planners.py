@@ -354,7 +354,7 @@ def test_the_rest_of_a_slow_step_is_not_made_soft(monkeypatch):
     bounds = []
 
     def solved(ahead, aim, prior, weights):
-        bounds.append(prior.lower / k0)
+        bounds.append(prior.table[2] / k0)
         return prior.controls, aim
 
     monkeypatch.setattr(lqr, "solve_stride", solved)

@@ -48,7 +48,7 @@ def cost(u, aim, its):
     end, outcome = STEP.step(GAIT.apex, u)
     if outcome is not Outcome.SECTION:
         return np.inf
-    parts = (end - aim) / TOLERANCE, (u[its.slots] - its.base) / its.change
+    parts = (end - aim) / TOLERANCE, (u[its.slots] - its.table[0]) / its.table[1]
     return float(np.sum(np.concatenate(parts) ** 2))
 
 
@@ -66,8 +66,8 @@ AIMS = {"faster": st.floats(-0.3, 0.3), "higher": st.floats(-0.03, 0.03)}
 def test_it_lowers_the_cost_within_its_bounds(faster, higher):
     aim, its = GAIT.apex + [faster, higher], prior()
     u, end = solve_stride(whole(STEP, GAIT.apex), aim, its, WEIGHTS)
-    assert np.all(u[SLOTS] >= its.lower)
-    assert np.all(u[SLOTS] <= its.upper)
+    assert np.all(u[SLOTS] >= its.table[2])
+    assert np.all(u[SLOTS] <= its.table[3])
     np.testing.assert_array_equal(u[3:], GAIT.controls[3:])
     np.testing.assert_allclose(STEP.step(GAIT.apex, u)[0], end, atol=1e-12)
     assert cost(u, aim, its) <= cost(GAIT.controls, aim, its) + 1e-12
@@ -79,8 +79,8 @@ def test_no_control_near_by_is_cheaper(faster, higher, seed):
     aim, its = GAIT.apex + [faster / 5, higher / 5], prior(rounds=20)
     u, _ = solve_stride(whole(STEP, GAIT.apex), aim, its, WEIGHTS)
     other = u.copy()
-    change = its.change * np.random.default_rng(seed).normal(0.0, 0.05, 3)
-    other[SLOTS] = np.clip(u[SLOTS] + change, its.lower, its.upper)
+    change = its.table[1] * np.random.default_rng(seed).normal(0.0, 0.05, 3)
+    other[SLOTS] = np.clip(u[SLOTS] + change, its.table[2], its.table[3])
     # Gauss-Newton stops where the cost is flat to within its rounds.
     assert cost(other, aim, its) > cost(u, aim, its) * (1.0 - 1e-3) - 1e-9
 
