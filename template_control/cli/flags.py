@@ -22,7 +22,7 @@ from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.plant.plant import default_plant
-from template_control.plant.terrain_spec import terrain_from
+from template_control.plant.terrain import terrain_from
 from template_control.robot.library import FLOATING_ROBOTS, SHIPPED
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import STEPS

@@ -22,7 +22,7 @@ def run(options: argparse.Namespace) -> int:
     from template_control.embedding.planners.walk_kernels import WALK
     from template_control.embedding.standing.curves import STAND
     from template_control.estimation.delay import DELAY
-    from template_control.plant.trunk import READ
+    from template_control.plant.bullet import READ
     from template_control.run.recorder import RECORD
     from template_control.slip.lateral.placing import LATERAL
     from template_control.warm_up import Part, ready

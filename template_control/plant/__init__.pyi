@@ -8,6 +8,6 @@ from .plant import Plant as Plant
 from .plant import default_plant as default_plant
 from .plant import open_plant as open_plant
 from .terrain import Terrain as Terrain
-from .terrain_spec import read_terrain as read_terrain
-from .terrain_spec import terrain_from as terrain_from
+from .terrain import read_terrain as read_terrain
+from .terrain import terrain_from as terrain_from
 from .world import WorldOptions as WorldOptions

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -17,22 +16,24 @@ import pinocchio as pin
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
+from template_control.compiled import compiled
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_damping, check_mass_matrix
 from template_control.plant.c_library import decimal_points, silenced
 from template_control.plant.terrain import Terrain, pieces
-from template_control.plant.trunk import READ, read_trunk
-from template_control.plant.world import OptionsPlant, WorldOptions
+from template_control.plant.world import EnginePlant, WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
 from template_control.robot.urdf import link_masses
-from template_control.warm_up import ready
+from template_control.warm_up import Part, ready
 
 _CLOSE = 1e-6  # of the robot's mass
 _BASE = -1  # PyBullet's index of the base link
 _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 _ANGULAR_FIRST = (3, 4, 5, 0, 1, 2)  # places of a velocity's components, linear first
+_Three = tuple[float, float, float]
+_Four = tuple[float, float, float, float]
 AXES = {2: [0, 2], 3: [0, 1, 2]}
 """Of a force's components, by how many there are."""
 
@@ -68,42 +69,6 @@ def pybullet() -> Any:
             " (which compiles it on Python 3.12 and later), or take another plant, such as mujoco"
         ) from None
     return module
-
-
-class EnginePlant(OptionsPlant, ABC):
-    """A plant in a physics engine, whose contacts are gone through once a step.
-
-    A subclass sets ``_stale`` where they are others, and writes ``_forces`` (n, d) [N] and
-    ``_trunk_lies``.
-    """
-
-    def __init__(self, robot: Biped) -> None:
-        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
-        self._trunk_lies, self._stale = False, True
-
-    @abstractmethod
-    def _find_contacts(self) -> None:
-        """Add the ground's forces to ``_forces``, and set ``_trunk_lies`` where the trunk lies."""
-
-    def contact_forces(self, out: Array) -> None:
-        """See :meth:`~.plant.Plant.contact_forces`.
-
-        Averages over the last physics step: the first sample of a touchdown is an impulse
-        divided by that step.
-        """
-        self._read_contacts()
-        out[:] = self._forces
-
-    def trunk_touches_ground(self) -> bool:
-        """See :class:`~.plant.Plant`."""
-        self._read_contacts()
-        return self._trunk_lies
-
-    def _read_contacts(self) -> None:
-        if self._stale:
-            self._stale, self._trunk_lies = False, False
-            self._forces[:] = 0.0
-            self._find_contacts()
 
 
 class BulletPlant(EnginePlant):
@@ -250,7 +215,7 @@ class BulletPlant(EnginePlant):
             v[i] = state[1]
 
     def _find_contacts(self) -> None:
-        """See :class:`EnginePlant`.
+        """See :class:`~.world.EnginePlant`.
 
         Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
         all. Whatever touches the robot is ground: it does not collide with itself.
@@ -280,12 +245,7 @@ class BulletPlant(EnginePlant):
                     forces[foot, i] += part
 
     def step(self, torque: Array, push: float = 0.0) -> None:
-        """Advance one physics step.
-
-        Args:
-            torque: (nu,) joint torques [N m].
-            push: horizontal disturbance on the trunk's centre of mass [N].
-        """
+        """See :meth:`~.plant.Plant.step`."""
         self._advance(torque, push, 0.0)
 
     def _advance(self, torque: Array, push: float, left: float) -> None:
@@ -425,3 +385,75 @@ def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
 def _pose(position: Any, quaternion: Any) -> pin.SE3:
     """A frame from its place [m] and its quaternion x y z w."""
     return pin.SE3(pin.Quaternion(np.array(quaternion)).matrix(), np.array(position))
+
+
+@compiled
+def read_trunk(
+    place: tuple[_Three, _Four],
+    velocity: tuple[_Three, _Three],
+    turn: Array,
+    shift: Array,
+    q: Array,
+    moving: Array,
+) -> None:
+    """Write the trunk's place and quaternion x y z w into ``q``, by ``place`` of its CoM.
+
+    ``turn`` and ``shift`` are the frame of the trunk in its axes of inertia. ``moving`` (5, 3) is
+    overwritten with the world's axes in the trunk's, and the velocity of the trunk's origin and its
+    angular velocity, in the world's axes.
+    """
+    (at, (x, y, z, w)), (linear, angular) = place, velocity
+    own, away = np.empty((3, 3)), np.empty(3)
+    own[0, 0], own[1, 1] = 1.0 - (2.0 * y * y + 2.0 * z * z), 1.0 - (2.0 * x * x + 2.0 * z * z)
+    own[2, 2] = 1.0 - (2.0 * x * x + 2.0 * y * y)
+    own[0, 1], own[1, 0] = 2.0 * y * x - 2.0 * z * w, 2.0 * y * x + 2.0 * z * w
+    own[0, 2], own[2, 0] = 2.0 * z * x + 2.0 * y * w, 2.0 * z * x - 2.0 * y * w
+    own[1, 2], own[2, 1] = 2.0 * z * y - 2.0 * x * w, 2.0 * z * y + 2.0 * x * w
+    for i in range(3):
+        for j in range(3):
+            moving[j, i] = own[i, 0] * turn[0, j] + own[i, 1] * turn[1, j] + own[i, 2] * turn[2, j]
+        q[i] = at[i] + (own[i, 0] * shift[0] + own[i, 1] * shift[1] + own[i, 2] * shift[2])
+        away[i] = at[i] - q[i]
+        moving[4, i] = angular[i]
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        moving[3, i] = linear[i] - (angular[j] * away[k] - angular[k] * away[j])
+    _near_quaternion(moving, q)
+
+
+@compiled
+def _near_quaternion(inverse: Array, q: Array) -> None:
+    """Write the quaternion of a rotation, given by its inverse, nearer to that in ``q``."""
+    m, found, i = inverse.T, np.empty(4), 3
+    trace = m[0, 0] + (m[1, 1] + m[2, 2])
+    if trace > 0.0:
+        root = np.sqrt(trace + 1.0)
+        half = 0.5 / root
+        found[3] = 0.5 * root
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            found[i] = (m[k, j] - m[j, k]) * half
+    else:
+        i = 1 if m[1, 1] > m[0, 0] else 0
+        i = 2 if m[2, 2] > m[i, i] else i
+        j, k = (i + 1) % 3, (i + 2) % 3
+        root = np.sqrt(m[i, i] - m[j, j] - m[k, k] + 1.0)
+        half = 0.5 / root
+        found[i], found[3] = 0.5 * root, (m[k, j] - m[j, k]) * half
+        found[j], found[k] = (m[j, i] + m[i, j]) * half, (m[k, i] + m[i, k]) * half
+    near = 0.0
+    for n in range(4):
+        near += found[n] * q[3 + n]
+    for n in range(4):
+        q[3 + n] = found[n] if near >= 0.0 else -found[n]
+
+
+def read_base() -> None:
+    """The state of a floating base in PyBullet."""
+    three = (0.0, 0.0, 0.0)
+    place, velocity = (three, (*three, 1.0)), (three, three)
+    read_trunk(place, velocity, np.eye(3), np.zeros(3), np.zeros(9), np.zeros((5, 3)))
+
+
+READ = (Part(read_base, 1.0),)
+"""Compiled functions of a floating base in PyBullet."""

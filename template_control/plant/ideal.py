@@ -108,10 +108,7 @@ class IdealPlant(OptionsPlant):
         q[:], v[:] = self._q, self._v
 
     def contact_forces(self, out: Array) -> None:
-        """Write the ground's force on each foot (n, 2) [N], x and y, into ``out``.
-
-        Averages over the last time step, impacts included.
-        """
+        """See :meth:`~.plant.Plant.contact_forces`; impacts are included."""
         out[:] = self._impulse / self.options.time_step
 
     def trunk_touches_ground(self) -> bool:
@@ -124,11 +121,7 @@ class IdealPlant(OptionsPlant):
         )
 
     def step(self, torque: Array, push: float = 0.0) -> None:
-        """Advance one time step.
-
-        Args:
-            torque: (nu,) joint torques [N m].
-            push: horizontal disturbance on the trunk's centre of mass [N].
+        """See :meth:`~.plant.Plant.step`.
 
         Raises:
             DivergedError: if the state is not finite any more, or the legs lie so that the

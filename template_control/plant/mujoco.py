@@ -13,9 +13,10 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_mass_matrix
-from template_control.plant.bullet import AXES, EnginePlant, PlantOptions, moment
+from template_control.plant.bullet import AXES, PlantOptions, moment
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
+from template_control.plant.world import EnginePlant
 from template_control.robot.biped import Biped
 from template_control.robot.terms import FLOATING_DOF, PATCH, UP
 
@@ -128,7 +129,7 @@ class MujocoPlant(EnginePlant):
         q[:], v[:] = self.data.qpos[self._q], self.data.qvel[self._v]
 
     def _find_contacts(self) -> None:
-        """See :class:`~.plant.bullet.EnginePlant`."""
+        """See :class:`~.world.EnginePlant`."""
         rows = self._forces.shape[1]
         axes, contacts = AXES[min(rows, UP + 1)], self.data.contact
         for i, shapes in enumerate(contacts.geom.tolist()):

@@ -77,16 +77,7 @@ class Plant(Protocol):
 World = WorldOptions | Plant
 """A plant, or the options of one of the library's."""
 
-_MEMBERS = (
-    "time_step",
-    "ground_height",
-    "reset",
-    "read",
-    "contact_forces",
-    "trunk_touches_ground",
-    "step",
-    "close",
-)
+_MEMBERS = [name for name in vars(Plant) if not name.startswith("_")]
 
 
 def default_plant() -> PlantOptions:

@@ -16,8 +16,8 @@ the edge to the sphere's centre.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from itertools import combinations
+from collections.abc import Iterable
+from itertools import chain, combinations
 
 import numpy as np
 
@@ -111,7 +111,8 @@ def pressing(
     every choice would pull or sink: all contacts are then held, whatever they pull.
     """
     touching = tuple(touching)
-    for held in _subsets(touching):
+    sizes = range(len(touching), -1, -1)
+    for held in chain.from_iterable(combinations(touching, size) for size in sizes):
         x, force = solve(mass_matrix, right, jacobian, gamma, held)
         normal = jacobian[:, 1] @ x + gamma[:, 1]
         pulls = any(force[i, 1] < -_ROUNDING * np.abs(force).max() for i in held)
@@ -122,12 +123,6 @@ def pressing(
             return held, x, force, True
     x, force = solve(mass_matrix, right, jacobian, gamma, touching)
     return touching, x, force, False
-
-
-def _subsets(items: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """All of them, the largest first."""
-    for size in range(len(items), -1, -1):
-        yield from combinations(items, size)
 
 
 class RollingFeet:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Self
 
+import numpy as np
+
+from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Positive
 from template_control.plant.terrain import Terrain
+from template_control.robot.biped import Biped
 from template_control.robot.spec import RobotSpec
 
 
@@ -68,3 +73,39 @@ class OptionsPlant:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+class EnginePlant(OptionsPlant, ABC):
+    """A plant in a physics engine, whose contacts are gone through once a step.
+
+    A subclass sets ``_stale`` where they are others, and writes ``_forces`` (n, d) [N] and
+    ``_trunk_lies``.
+    """
+
+    def __init__(self, robot: Biped) -> None:
+        self._forces = np.zeros((len(robot.feet), robot.contact_rows))
+        self._trunk_lies, self._stale = False, True
+
+    @abstractmethod
+    def _find_contacts(self) -> None:
+        """Add the ground's forces to ``_forces``, and set ``_trunk_lies`` where the trunk lies."""
+
+    def contact_forces(self, out: Array) -> None:
+        """See :meth:`~.plant.Plant.contact_forces`.
+
+        Averages over the last physics step: the first sample of a touchdown is an impulse
+        divided by that step.
+        """
+        self._read_contacts()
+        out[:] = self._forces
+
+    def trunk_touches_ground(self) -> bool:
+        """See :class:`~.plant.Plant`."""
+        self._read_contacts()
+        return self._trunk_lies
+
+    def _read_contacts(self) -> None:
+        if self._stale:
+            self._stale, self._trunk_lies = False, False
+            self._forces[:] = 0.0
+            self._find_contacts()

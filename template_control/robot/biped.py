@@ -41,13 +41,7 @@ _SAGITTAL = {2: 1, 3: UP}  # by directions: from forward to up
 
 
 def leg_means(values: Array, groups: Sequence[Sequence[int]], axis: int = 0) -> Array:
-    """Means over the contacts of each template leg; NaN of a leg without any.
-
-    Args:
-        values: of each contact along ``axis``, which the legs take the place of.
-        groups: contacts of each template leg.
-        axis: of the contacts.
-    """
+    """Means over the contacts, along an axis, of each template leg; NaN of a leg without any."""
     missing = np.full_like(values.take(0, axis), np.nan)
     means = [values.take(group, axis).mean(axis) if group else missing for group in groups]
     return np.stack(means, axis)

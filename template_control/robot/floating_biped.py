@@ -24,25 +24,13 @@ from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.errors import ParameterError, RobotError
+from template_control.robot import urdf_edits
 from template_control.robot.biped import Biped
 from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
 from template_control.robot.terms import FLOATING_DOF, MOST_SPARE, UP, gather_floating
 from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
-from template_control.robot.urdf_edits import (
-    check_joint_names,
-    complete,
-    drop_world,
-    joints_in_no_leg,
-    lock,
-    mimics,
-    moving_joints,
-    set_limits,
-    set_ranges,
-    spheres,
-    take_points,
-)
 from template_control.structured import Number, keep
 
 _UNIT = 1e-12  # of a quaternion's square: what integrating it leaves
@@ -241,25 +229,28 @@ class FloatingBaseBiped(Biped):
         """
         path = Path(path)
         tree = read_urdf(path)
-        drop_world(tree)
+        urdf_edits.drop_world(tree)
         read_losses(path, tree, lossless)
         if limits is not None:
-            set_limits(tree, limits.torque, limits.velocity)
+            urdf_edits.set_limits(tree, limits.torque, limits.velocity)
             if limits.ranges:
-                set_ranges(path, tree, feet, limits.ranges)
+                urdf_edits.set_ranges(path, tree, feet, limits.ranges)
         flat = flat_feet or sole is not None
         if flat and foot_radius is not None:
             raise RobotError(f"{path}: flat feet have no foot_radius: leave one of them out")
         if upper_body and not flat:
             raise RobotError(f"{path}: upper_body is of a robot on flat feet: give flat_feet too")
         if locked or flat:
-            check_joint_names(path, tree, locked or ())
-            others = joints_in_no_leg(tree, feet) if flat else set()
-            held = {*(locked or {}), *(mimics(tree).keys() & others if upper_body else others)}
-            lock(path, tree, moving_joints(tree, held), locked or {})
-            take_points(path, tree)
-        spheres(path, tree, feet, foot_radius, foot_offset)
-        urdf = complete(path, tree)
+            urdf_edits.check_joint_names(path, tree, locked or ())
+            others = urdf_edits.joints_in_no_leg(tree, feet) if flat else set()
+            held = {
+                *(locked or {}),
+                *(urdf_edits.mimics(tree).keys() & others if upper_body else others),
+            }
+            urdf_edits.lock(path, tree, urdf_edits.moving_joints(tree, held), locked or {})
+            urdf_edits.take_points(path, tree)
+        urdf_edits.spheres(path, tree, feet, foot_radius, foot_offset)
+        urdf = urdf_edits.complete(path, tree)
         model = cls._model_of(path, urdf)
         check_floating(path, model, feet, flat)
         check_bodies(path, tree, model, _ROOT + 1)

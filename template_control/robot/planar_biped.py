@@ -3,11 +3,17 @@
 Frames: world x forward, y up (the URDF's z), pitch about the URDF's +y, so that a forward
 lean is positive. The generalised coordinates are q = (x, z, pitch, joints) in Pinocchio's
 joint order; all hinges are revolute, so nq = nv.
+
+The URDF of a 3D biped is rewritten as a planar one, which serves Pinocchio, PyBullet and the viewer
+alike: three base joints (x, z, pitch) carry the root link, all joints but the hips and knees are
+fixed where they are locked, and the feet are spheres. What the plane takes away is only what it
+holds: masses and inertias are kept, and forces out of the plane are the guide's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import xml.etree.ElementTree as ET
+from collections.abc import Collection, Mapping, Sequence
 from math import cos, sin
 from pathlib import Path
 
@@ -17,20 +23,26 @@ import pinocchio as pin
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import RobotError
+from template_control.robot import urdf_edits
 from template_control.robot.biped import MONOPOD, SINGLE, Biped
-from template_control.robot.planarise import planarise
 from template_control.robot.requirements import (
     add_feet,
-    check_guide,
     check_planar,
     check_planar_legs,
 )
 from template_control.robot.terms import PLANAR_DOF, gather_planar
-from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
-from template_control.robot.urdf_edits import complete, drop_world
+from template_control.robot.urdf import build_model, check_bodies, end_of, read_losses, read_urdf
 from template_control.structured import keep
 
 _PITCH = 2  # place of the trunk's pitch in q
+_BASE = (
+    ("base_x", "prismatic", "1 0 0"),
+    ("base_z", "prismatic", "0 0 1"),
+    ("base_pitch", "revolute", "0 1 0"),
+)
+_WORLD = ("world", "slide_x", "slide_z")
+_SAGITTAL = 4  # joints that stay
+_HINGES = ("revolute", "continuous")
 
 
 class PlanarBiped(Biped):
@@ -103,14 +115,13 @@ class PlanarBiped(Biped):
         """
         path = Path(path)
         tree = read_urdf(path)
-        drop_world(tree)
+        urdf_edits.drop_world(tree)
         read_losses(path, tree, lossless)
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius, foot_offset)
-        urdf = complete(path, tree)
+        urdf = urdf_edits.complete(path, tree)
         model = build_model(path, urdf)
         check_planar(path, model, len(feet))
-        check_guide(path, model)
         only_3d = {"foot_radius": foot_radius, "foot_offset": foot_offset, "locked": locked or None}
         for name, value in only_3d.items():
             if value is not None and not sagittal_joints:
@@ -151,3 +162,101 @@ class PlanarBiped(Biped):
     def tilt(self, q: Array) -> float:
         """See :meth:`~.biped.Biped.tilt`."""
         return abs(float(q[_PITCH]))
+
+
+def planarise(
+    path: Path,
+    robot: ET.Element,
+    feet: Sequence[str],
+    sagittal_joints: Sequence[str],
+    locked: Mapping[str, float],
+    foot_radius: float | None,
+    foot_offset: Sequence[float] | None = None,
+) -> None:
+    """Make a 3D URDF a planar one, in place; arguments as of :meth:`PlanarBiped.from_urdf`."""
+    if len(set(sagittal_joints)) != _SAGITTAL:
+        raise RobotError(
+            f"{path}: sagittal_joints are {list(sagittal_joints)}: name {_SAGITTAL} different"
+            " hinges in its legs: a hip and a knee each"
+        )
+    joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
+    urdf_edits.check_joint_names(path, robot, (*sagittal_joints, *locked))
+    for name in sagittal_joints:
+        if joints[name].get("type") not in _HINGES:
+            raise RobotError(
+                f"{path}: joint {name!r} is {joints[name].get('type')}: name hips and knees, which"
+                " are revolute, as sagittal_joints"
+            )
+    urdf_edits.lock(path, robot, sagittal_joints, locked)
+    for name in sagittal_joints:
+        if joints[name].get("type") == "continuous":
+            _bound(path, joints[name])
+    hips = _check_axes(path, robot, sagittal_joints)
+    root = urdf_edits.root_link(robot)
+    urdf_edits.take_points(path, robot)
+    _shift(robot, root, hips)
+    urdf_edits.spheres(path, robot, feet, foot_radius, foot_offset)
+    links = _free(_WORLD, {str(link.get("name")) for link in robot.findall("link")})
+    for link in links:
+        ET.SubElement(robot, "link", name=link)
+    names = _free([name for name, _, _ in _BASE], joints)
+    rows = zip(names, _BASE, links, (*links[1:], root), strict=True)
+    for name, (_, kind, axis), parent, child in rows:
+        joint = ET.SubElement(robot, "joint", name=name, type=kind)
+        ET.SubElement(joint, "parent", link=parent)
+        ET.SubElement(joint, "child", link=child)
+        ET.SubElement(joint, "axis", xyz=axis)
+        ET.SubElement(joint, "limit", lower="-1e3", upper="1e3", effort="0", velocity="1e3")
+
+
+def _free(names: Sequence[str], taken: Collection[str]) -> list[str]:
+    """Names that no other part of the robot has, by underscores at their ends."""
+    found = []
+    for name in names:
+        while name in taken:
+            name += "_"
+        found.append(name)
+    return found
+
+
+def _bound(path: Path, joint: ET.Element) -> None:
+    """Give a hinge without stops wide ones: an angle is then one number."""
+    limit = joint.find("limit")
+    if limit is None:
+        raise RobotError(f"{path}: joint {joint.get('name')!r} has no limit: give its torque limit")
+    joint.set("type", "revolute")
+    limit.set("lower", "-10")
+    limit.set("upper", "10")
+
+
+def _check_axes(path: Path, robot: ET.Element, sagittal: Sequence[str]) -> Array:
+    """Midpoint (3,) of the hips in the root link's frame [m], once all hinges are lateral."""
+    model = build_model(path, ET.tostring(robot, encoding="unicode"))
+    data = model.createData()
+    jacobians = pin.computeJointJacobians(model, data, pin.neutral(model))
+    for name in sagittal:
+        index = model.getJointId(name)
+        axis = jacobians[3:, model.joints[index].idx_v]
+        if abs(abs(axis[1]) - 1.0) > 1e-6:
+            raise RobotError(
+                f"{path}: joint {name!r} turns about {np.round(axis, 3).tolist()} and not about"
+                " the lateral axis y: name hips and knees as sagittal_joints, and lock the others"
+                " where the legs are upright"
+            )
+    hips = [
+        data.oMi[model.getJointId(name)].translation
+        for name in sagittal
+        if model.parents[model.getJointId(name)] == 0
+    ]
+    return np.mean(hips, axis=0)
+
+
+def _shift(robot: ET.Element, root: str, hips: Array) -> None:
+    """Move the root link's frame to the height of the hips, where the pitch joint is."""
+    offset = hips * [1.0, 0.0, 1.0]
+    parts = [e for link in robot.findall("link") if link.get("name") == root for e in link]
+    parts = [e for e in parts if e.tag in ("inertial", "visual", "collision")]
+    parts += [joint for joint in robot.findall("joint") if end_of(joint, "parent") == root]
+    for part in parts:
+        origin = urdf_edits.origin_of(part)
+        origin.set("xyz", urdf_edits.vector_text(urdf_edits.vector(origin.get("xyz")) - offset))

@@ -88,6 +88,12 @@ def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
             f" controlled; name these {HINGES * legs} as sagittal_joints"
         )
     _check_limits(path, model, range(PLANAR_DOF + 1, model.njoints))
+    for joint in range(PLANAR_DOF):  # the guide only holds the robot
+        if model.damping[joint] > 0.0 or model.upperDryFrictionLimit[joint] > 0.0:
+            raise RobotError(
+                f"{path}: base joint {model.names[1 + joint]!r} has damping or friction: leave them"
+                " out, as lossless does for all joints"
+            )
 
 
 def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
@@ -112,16 +118,6 @@ def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None
             raise RobotError(
                 f"{path}: hip {model.names[hip]!r} is {place.round(4).tolist()} m from the base's"
                 " pitch joint: place the trunk's origin between the hips"
-            )
-
-
-def check_guide(path: Path, model: pin.Model) -> None:
-    """Check that the joints of a planar robot's base lose nothing: the guide only holds it."""
-    for joint in range(PLANAR_DOF):
-        if model.damping[joint] > 0.0 or model.upperDryFrictionLimit[joint] > 0.0:
-            raise RobotError(
-                f"{path}: base joint {model.names[1 + joint]!r} has damping or friction: leave them"
-                " out, as lossless does for all joints"
             )
 
 

@@ -219,6 +219,12 @@ def gather_joints(
 
 
 @compiled
+def _level(frame: Array, x: float, y: float) -> tuple[float, float]:
+    """A horizontal vector of the world in a robot's ``heading_frame``."""
+    return frame[2] * x + frame[3] * y, frame[2] * y - frame[3] * x
+
+
+@compiled
 def onward(facing: float) -> float:
     """1 of a robot that goes where its trunk faces; -1 of one that goes backward."""
     return 1.0 if np.cos(facing) > 0.0 else -1.0
@@ -303,22 +309,15 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     frame, trunk = base
     rotation, st, nv = trunk[0], data[0], v.shape[0]
     finite = gather_joints(q, v, limits, st, effects, joints)
-    c, s, r = frame[2], frame[3], st.foot_radius
-    x, y = centre[0] - frame[0], centre[1] - frame[1]
-    st.com[0], st.com[1], st.com[2] = c * x + s * y, c * y - s * x, centre[2]
-    st.com_velocity[0] = c * speed[0] + s * speed[1]
-    st.com_velocity[1] = c * speed[1] - s * speed[0]
-    st.com_velocity[2] = speed[2]
-    st.momentum[0] = c * momentum[3] + s * momentum[4]
-    st.momentum[1] = c * momentum[4] - s * momentum[3]
-    st.momentum[2] = momentum[5]
+    r = st.foot_radius
+    st.com[0], st.com[1] = _level(frame, centre[0] - frame[0], centre[1] - frame[1])
+    st.com_velocity[0], st.com_velocity[1] = _level(frame, speed[0], speed[1])
+    st.momentum[0], st.momentum[1] = _level(frame, momentum[3], momentum[4])
+    st.com[2], st.com_velocity[2], st.momentum[2] = centre[2], speed[2], momentum[5]
     for k in range(nv):
-        jcom[0, k] = c * jcom_world[0, k] + s * jcom_world[1, k]
-        jcom[1, k] = c * jcom_world[1, k] - s * jcom_world[0, k]
-        jcom[2, k] = jcom_world[2, k]
-        jspin[0, k] = c * centroidal[3, k] + s * centroidal[4, k]
-        jspin[1, k] = c * centroidal[4, k] - s * centroidal[3, k]
-        jspin[2, k] = centroidal[5, k]
+        jcom[0, k], jcom[1, k] = _level(frame, jcom_world[0, k], jcom_world[1, k])
+        jspin[0, k], jspin[1, k] = _level(frame, centroidal[3, k], centroidal[4, k])
+        jcom[2, k], jspin[2, k] = jcom_world[2, k], centroidal[5, k]
     # Of the free flyer the rows of C v are, in the trunk's axes, the rates of linear momentum and
     # of the angular momentum about the base at zero acceleration; move the latter to the CoM.
     force, moment = np.zeros(3), np.zeros(3)
@@ -330,20 +329,18 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     moment[0] -= ay * force[2] - az * force[1]
     moment[1] -= az * force[0] - ax * force[2]
     moment[2] -= ax * force[1] - ay * force[0]
-    st.com_bias[0] = (c * force[0] + s * force[1]) / st.mass
-    st.com_bias[1] = (c * force[1] - s * force[0]) / st.mass
-    st.com_bias[2] = force[2] / st.mass
-    st.momentum_bias[0] = c * moment[0] + s * moment[1]
-    st.momentum_bias[1] = c * moment[1] - s * moment[0]
+    st.momentum_bias[0], st.momentum_bias[1] = _level(frame, moment[0], moment[1])
     st.momentum_bias[2] = moment[2]
+    force[0], force[1] = _level(frame, force[0], force[1])
+    for i in range(3):
+        st.com_bias[i] = force[i] / st.mass
     place, drift, patches = np.empty(3), np.empty(PATCH), contact.shape[1] == PATCH
     for i in range(contact.shape[0]):
         move_point(points, i, place, drift)
         px, py, pz = place[0], place[1], place[2]
-        x, y = px - frame[0], py - frame[1]
-        st.contact_position[i, 0], st.contact_position[i, 1] = c * x + s * y, c * y - s * x
-        st.contact_position[i, 2] = pz - r
-        speeds = st.contact_velocity[i]
+        at, speeds = st.contact_position[i], st.contact_velocity[i]
+        at[0], at[1] = _level(frame, px - frame[0], py - frame[1])
+        at[2] = pz - r
         speeds[:] = 0.0
         for k in range(nv):
             if carries[i, k] == 0.0:
@@ -352,22 +349,21 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
             # Rolling without slip: the material point below the sphere's centre is at rest.
             jx = jacobian[0, k] + wy * (pz - r) - wz * py
             jy = jacobian[1, k] + wz * px - wx * (pz - r)
-            contact[i, 0, k], contact[i, 1, k] = c * jx + s * jy, c * jy - s * jx
+            contact[i, 0, k], contact[i, 1, k] = _level(frame, jx, jy)
             contact[i, 2, k] = jacobian[2, k] + wx * py - wy * px
             if patches:
-                contact[i, 3, k], contact[i, 4, k] = c * wx + s * wy, c * wy - s * wx
+                contact[i, 3, k], contact[i, 4, k] = _level(frame, wx, wy)
                 contact[i, 5, k] = wz
             for row in range(contact.shape[1]):
                 speeds[row] += contact[i, row, k] * v[k]
-        bx, by = drift[0] - r * drift[4], drift[1] + r * drift[3]
-        st.contact_bias[i, 0], st.contact_bias[i, 1] = c * bx + s * by, c * by - s * bx
-        st.contact_bias[i, 2] = drift[2]
+        bias = st.contact_bias[i]
+        bias[0], bias[1] = _level(frame, drift[0] - r * drift[4], drift[1] + r * drift[3])
+        bias[2] = drift[2]
         if patches:
             _gather_patch(st, i, drift, frame, points)
     _gather_feet(st)
     for k in range(3):
-        jturning[0, 3 + k] = c * rotation[0, k] + s * rotation[1, k]
-        jturning[1, 3 + k] = c * rotation[1, k] - s * rotation[0, k]
+        jturning[0, 3 + k], jturning[1, 3 + k] = _level(frame, rotation[0, k], rotation[1, k])
         jturning[2, 3 + k] = rotation[2, k]
     for i in range(3):
         st.turning[i] = 0.0
@@ -380,28 +376,22 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
 @compiled
 def _gather_patch(s: Any, patch: int, drift: Array, frame: Array, points: Any) -> None:
     """Write the angular drift of a patch, and its axes."""
-    c, sine = frame[2], frame[3]
-    s.contact_bias[patch, 3] = c * drift[3] + sine * drift[4]
-    s.contact_bias[patch, 4] = c * drift[4] - sine * drift[3]
-    s.contact_bias[patch, 5] = drift[5]
-    own = points[5][patch]
+    own, axes, bias = points[5][patch], s.contact_axes[patch], s.contact_bias[patch]
+    bias[3], bias[4] = _level(frame, drift[3], drift[4])
+    bias[5] = drift[5]
     for k in range(3):
-        x, y, z = turned(points[1][patch], own[0, k], own[1, k], own[2, k])
-        s.contact_axes[patch, 0, k] = c * x + sine * y
-        s.contact_axes[patch, 1, k] = c * y - sine * x
-        s.contact_axes[patch, 2, k] = z
+        x, y, axes[2, k] = turned(points[1][patch], own[0, k], own[1, k], own[2, k])
+        axes[0, k], axes[1, k] = _level(frame, x, y)
 
 
 @compiled
 def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any, ...]) -> None:
     """Write how the trunk stands, and where its hips are."""
     rotation, places, axes, points = trunk
-    c, s = frame[2], frame[3]
-    ahead = c * rotation[0, 2] + s * rotation[1, 2]
-    left = c * rotation[1, 2] - s * rotation[0, 2]
+    ahead, left = _level(frame, rotation[0, 2], rotation[1, 2])
     state.attitude[0] = np.arctan2(-left, rotation[2, 2])
     state.attitude[1] = np.arctan2(ahead, rotation[2, 2])
-    ahead, left = c * rotation[0, 0] + s * rotation[1, 0], c * rotation[1, 0] - s * rotation[0, 0]
+    ahead, left = _level(frame, rotation[0, 0], rotation[1, 0])
     c2, s2 = np.cos(state.facing), np.sin(state.facing)
     state.attitude[2] = np.arctan2(c2 * left - s2 * ahead, c2 * ahead + s2 * left)
     middle = np.zeros(3)
@@ -411,10 +401,10 @@ def _gather_trunk(q: Array, v: Array, state: Any, frame: Array, trunk: tuple[Any
             middle[k] += place[k] + point[k]
     for k in range(3):
         middle[k] /= len(places)
-    state.hips[0] = c * (middle[0] - frame[0]) + s * (middle[1] - frame[1])
-    state.hips[1] = c * (middle[1] - frame[1]) - s * (middle[0] - frame[0])
-    state.hips[2] = middle[2]
+    hips = state.hips
+    hips[0], hips[1] = _level(frame, middle[0] - frame[0], middle[1] - frame[1])
+    hips[2] = middle[2]
     # The hips move with the trunk, whose origin is elsewhere.
     moving = turned(rotation, v[0], v[1], v[2])
-    level = c * moving[0] + s * moving[1] + state.turning[1] * (middle[2] - q[2])
+    level = _level(frame, moving[0], moving[1])[0] + state.turning[1] * (middle[2] - q[2])
     state.hip_speed = level - state.turning[2] * frame[4]

@@ -14,26 +14,17 @@ import pinocchio as pin
 
 from template_control.arrays import Array
 from template_control.errors import RobotError
-from template_control.robot.urdf import (
-    MOMENTS,
-    check_inertias,
-    check_motion,
-    check_shapes,
-    end_of,
-    strip_motion,
-    warn_once,
-    why_impossible,
-)
+from template_control.robot import urdf
 
 _PACKAGE = ("package://", "model://")  # what the name of a package's mesh begins with
 
 
 def complete(path: Path, robot: ET.Element) -> str:
     """The text of a URDF as all engines read it, once its joints and feet are as they shall be."""
-    check_motion(path, robot)
-    check_inertias(path, robot)
+    urdf.check_motion(path, robot)
+    urdf.check_inertias(path, robot)
     find_meshes(path, robot)
-    check_shapes(path, robot)
+    urdf.check_shapes(path, robot)
     gather_inertias(robot)
     write_out_massless(robot)
     return ET.tostring(robot, encoding="unicode")
@@ -67,11 +58,11 @@ def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
 
 def _carriers(robot: ET.Element, link: str) -> list[ET.Element]:
     """The joints that carry a link, from its own to the root's."""
-    above = {end_of(joint, "child"): joint for joint in robot.findall("joint")}
+    above = {urdf.end_of(joint, "child"): joint for joint in robot.findall("joint")}
     found = []
     while link in above:
         found.append(above.pop(link))
-        link = end_of(found[-1], "parent")
+        link = urdf.end_of(found[-1], "parent")
     return found
 
 
@@ -123,7 +114,7 @@ def _fix(joint: ET.Element, position: float) -> None:
     else:
         origin.set("rpy", vector_text(pin.rpy.matrixToRpy(rotation @ pin.exp3(direction))))
     joint.set("type", "fixed")
-    strip_motion(joint)
+    urdf.strip_motion(joint)
 
 
 def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
@@ -209,7 +200,7 @@ def find_meshes(path: Path, robot: ET.Element) -> None:
                         " put it there, or give the link a box, cylinder or sphere"
                     )
     if missing:
-        warn_once(
+        urdf.warn_once(
             "%s: %d meshes are missing, the first is %s: the robot walks, and is shown with sticks",
             path,
             len(missing),
@@ -250,19 +241,19 @@ def take_points(path: Path, robot: ET.Element) -> None:
     while waiting:
         name = waiting.pop()
         for joint in robot.findall("joint"):
-            if end_of(joint, "parent") != name or joint.get("type") != "fixed":
+            if urdf.end_of(joint, "parent") != name or joint.get("type") != "fixed":
                 continue
-            child = end_of(joint, "child")
+            child = urdf.end_of(joint, "child")
             waiting.append(child)
             inertia = links[child].find("inertial/inertia")
-            if inertia is not None and why_impossible(links[child]):
-                inertia.attrib.update(dict.fromkeys(MOMENTS, "0"))
+            if inertia is not None and urdf.why_impossible(links[child]):
+                inertia.attrib.update(dict.fromkeys(urdf.MOMENTS, "0"))
                 points.append(child)
     if points:
         text = (
             "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points"
         )
-        warn_once(text, path, len(points), ", ".join(points))
+        urdf.warn_once(text, path, len(points), ", ".join(points))
 
 
 def write_out_massless(robot: ET.Element) -> None:
@@ -271,17 +262,17 @@ def write_out_massless(robot: ET.Element) -> None:
         if link.find("inertial") is None:
             inertial = ET.SubElement(link, "inertial")
             ET.SubElement(inertial, "mass", value="0")
-            ET.SubElement(inertial, "inertia", dict.fromkeys(MOMENTS, "0"))
+            ET.SubElement(inertial, "inertia", dict.fromkeys(urdf.MOMENTS, "0"))
 
 
 def drop_world(robot: ET.Element) -> None:
     """Remove a massless root link that carries nothing but a floating joint: it floats anyway."""
     links = {link.get("name"): link for link in robot.findall("link")}
     joints = robot.findall("joint")
-    children = {end_of(joint, "child") for joint in joints}
+    children = {urdf.end_of(joint, "child") for joint in joints}
     for joint in joints:
-        parent = end_of(joint, "parent")
-        alone = sum(end_of(other, "parent") == parent for other in joints) == 1
+        parent = urdf.end_of(joint, "parent")
+        alone = sum(urdf.end_of(other, "parent") == parent for other in joints) == 1
         is_root = parent not in children and _inertia(links[parent]).mass == 0.0
         if joint.get("type") == "floating" and alone and is_root:
             robot.remove(joint)
@@ -298,8 +289,10 @@ def gather_inertias(robot: ET.Element) -> None:
     fixed = defaultdict(list)
     for joint in robot.findall("joint"):
         if joint.get("type") == "fixed":
-            fixed[end_of(joint, "parent")].append(joint)
-    first = links.keys() - {end_of(joint, "child") for group in fixed.values() for joint in group}
+            fixed[urdf.end_of(joint, "parent")].append(joint)
+    first = links.keys() - {
+        urdf.end_of(joint, "child") for group in fixed.values() for joint in group
+    }
     for name in sorted(first):
         if _inertia(links[name]).mass > 0.0:
             continue
@@ -308,7 +301,7 @@ def gather_inertias(robot: ET.Element) -> None:
         while waiting:
             parent = waiting.pop()
             for joint in fixed[parent]:
-                child = end_of(joint, "child")
+                child = urdf.end_of(joint, "child")
                 if child in found:  # a loop: Pinocchio says so
                     continue
                 found[child] = found[parent] * _placement(joint)
@@ -332,7 +325,7 @@ def _inertia(link: ET.Element) -> pin.Inertia:
     mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
     if mass is None or inertia is None:
         return pin.Inertia.Zero()
-    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in MOMENTS)
+    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in urdf.MOMENTS)
     tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     own = pin.Inertia(float(mass.get("value", "0")), np.zeros(3), tensor)
     return _placement(link.find("inertial")).act(own)
@@ -349,7 +342,7 @@ def _set_inertia(link: ET.Element, inertia: pin.Inertia | None) -> None:
     ET.SubElement(inertial, "origin", xyz=" ".join(map(repr, inertia.lever.tolist())))
     ET.SubElement(inertial, "mass", value=repr(float(inertia.mass)))
     tensor = inertia.inertia[np.triu_indices(3)].tolist()
-    ET.SubElement(inertial, "inertia", dict(zip(MOMENTS, map(repr, tensor), strict=True)))
+    ET.SubElement(inertial, "inertia", dict(zip(urdf.MOMENTS, map(repr, tensor), strict=True)))
 
 
 def root_link(robot: ET.Element) -> str:

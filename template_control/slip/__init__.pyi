@@ -35,6 +35,7 @@ from .gaits.gait import Gait as Gait
 from .gaits.gait import WalkingGait as WalkingGait
 from .gaits.gait import gait_at as gait_at
 from .gaits.gait import gait_from_energy as gait_from_energy
+from .gaits.gait import on_slope as on_slope
 from .gaits.gait import with_push_off as with_push_off
 from .gaits.gait import without_push_off as without_push_off
 from .gaits.gait_branch import ControlledFamily as ControlledFamily
@@ -43,7 +44,6 @@ from .gaits.gait_branch import controlled_fixed_point as controlled_fixed_point
 from .gaits.running_gait import RunningGait as RunningGait
 from .gaits.running_gait import running_gait as running_gait
 from .gaits.running_gait import running_speeds as running_speeds
-from .gaits.slope_gait import on_slope as on_slope
 from .gaits.walking_by_speed import SpeedFamily as SpeedFamily
 from .gaits.walking_by_speed import gait_for_speed as gait_for_speed
 from .gaits.walking_by_speed import walking_by_speed as walking_by_speed

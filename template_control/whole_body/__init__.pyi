@@ -3,13 +3,13 @@ from .solver import Solution as Solution
 from .solver import Stance as Stance
 from .solver import WholeBodyQp as WholeBodyQp
 from .stack import TaskStack as TaskStack
-from .target_tasks import FrameTask as FrameTask
-from .target_tasks import JointTask as JointTask
 from .task import References as References
 from .task import Rows as Rows
 from .task import Task as Task
 from .tasks import ComTask as ComTask
 from .tasks import FootTask as FootTask
+from .tasks import FrameTask as FrameTask
+from .tasks import JointTask as JointTask
 from .tasks import MomentumTask as MomentumTask
 from .tasks import OrientationTask as OrientationTask
 from .tasks import PostureTask as PostureTask

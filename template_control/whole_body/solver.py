@@ -33,19 +33,7 @@ from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.robot import Robot
 from template_control.slip.similarity import RATE, TIME, tuned
 from template_control.structured import Number
-from template_control.whole_body.problem import (
-    BRAKED,
-    FREE,
-    QP_DATA,
-    SINGULAR,
-    Matrices,
-    answer,
-    assemble,
-    matrices,
-    rows_per_contact,
-    solve_free,
-    torques,
-)
+from template_control.whole_body import problem
 from template_control.whole_body.stack import TaskStack
 
 _LOG = logging.getLogger(__name__)
@@ -195,11 +183,13 @@ class Workspace:
 
     def __init__(self, robot: Robot, contacts: int, bounded: int = 0) -> None:
         nv, nu, directions = robot.nv, len(robot.torque_limit), robot.contact_rows
-        rows = nu + rows_per_contact(directions) * contacts + bounded
+        rows = nu + problem.rows_per_contact(directions) * contacts + bounded
         self._identity = np.eye(nu)
         numbers = (nu + 1) * (nv + directions * contacts) + nu * (nu + 2) + rows * (nu + 2)
         self.work = np.zeros(numbers)
-        self.matrices = Matrices(*matrices(self.work, nv, nu, directions * contacts, rows))
+        self.matrices = problem.Matrices(
+            *problem.matrices(self.work, nv, nu, directions * contacts, rows)
+        )
         self.bounds = np.zeros((2, bounded))
         self.rows = rows
         self._proxqp = load_proxqp()
@@ -268,7 +258,7 @@ class WholeBodyQp:
     def __init__(self, robot: Robot, options: QpOptions | None = None) -> None:
         o = options or QpOptions()
         self.robot = robot
-        self.data = np.zeros(1, QP_DATA)
+        self.data = np.zeros(1, problem.QP_DATA)
         now = self.data[0]
         now["force_cost"], now["torque_cost"] = FORCE_COST, TORQUE_COST
         now["sole_share"] = SOLE_SHARE
@@ -294,6 +284,7 @@ class WholeBodyQp:
 
     @torque_limit.setter
     def torque_limit(self, limit: Array) -> None:
+        """See the class."""
         self._torque_limit = limit
         self._take_load(self._load)
 
@@ -314,7 +305,7 @@ class WholeBodyQp:
         now["cap"][:count], directions = stance.cap, self.robot.contact_rows
         now["force"][:count, :directions] = stance.force.reshape(count, directions)
         robot, room, found = self.robot, self.room(load), self.answer_arrays()
-        kind = solve_free(self.data, robot.data, robot.arrays, tasks.table, room, found)
+        kind = problem.solve_free(self.data, robot.data, robot.arrays, tasks.table, room, found)
         return self.finish(kind, tasks, found)
 
     def room(self, load: float) -> tuple[Array, Array, Array, Array]:
@@ -342,7 +333,7 @@ class WholeBodyQp:
         Raises:
             ParameterError: naming a task that wrote a number which is not finite.
         """
-        seconds, solved = 0.0, kind == FREE
+        seconds, solved = 0.0, kind == problem.FREE
         if not solved:
             seconds, solved = self._solve_limited(kind, tasks, found)
         self._failing = not solved
@@ -365,29 +356,29 @@ class WholeBodyQp:
         now, robot, limit = self.data[0], self.robot, self._limit
         contacts = int(now["contacts"])
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
-        slacks = (-np.inf, 0.0, None) if kind == BRAKED else (None,)
-        seconds, solved, assembled = 0.0, False, kind != BRAKED
+        slacks = (-np.inf, 0.0, None) if kind == problem.BRAKED else (None,)
+        seconds, solved, assembled = 0.0, False, kind != problem.BRAKED
         for slack in slacks:
             w = (self.workspaces if slack is None else self._braked)[contacts]
             if slack is not None:
                 bound_joints(robot, self._options, w.bounds, slack)
             if not assembled:
                 arguments = (robot.arrays, tasks.table, limit, w.bounds, w.work)
-                kind = assemble(now, robot.data[0], *arguments)
-            best, solved = w.matrices.minimum, kind == FREE
+                kind = problem.assemble(now, robot.data[0], *arguments)
+            best, solved = w.matrices.minimum, kind == problem.FREE
             if not solved:
                 tasks.check_finite()  # with such a number no constraint is kept
                 start = time.perf_counter()
-                solved = kind != SINGULAR and w.solve()
+                solved = kind != problem.SINGULAR and w.solve()
                 seconds += time.perf_counter() - start
                 best = w.qp.results.x
             if solved:
-                torques(w.matrices.factor, best, limit, self._torque)
+                problem.torques(w.matrices.factor, best, limit, self._torque)
                 break
         else:
-            self._tell(kind != SINGULAR, contacts)
+            self._tell(kind != problem.SINGULAR, contacts)
             np.clip(self._torque, -limit, limit, out=self._torque)
-        answer(now, w.work, self._torque, found)
+        problem.answer(now, w.work, self._torque, found)
         return seconds, solved
 
     def _tell(self, regular: bool, contacts: int) -> None:

@@ -39,8 +39,13 @@ from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.gaits.gait import GaitFamily, WalkingGait, control_units, vlo_jacobians
-from template_control.slip.gaits.slope_gait import on_slope
+from template_control.slip.gaits.gait import (
+    GaitFamily,
+    WalkingGait,
+    control_units,
+    on_slope,
+    vlo_jacobians,
+)
 from template_control.slip.gaits.walking_by_speed import other_walks
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters

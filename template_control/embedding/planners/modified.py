@@ -12,7 +12,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, NotNegative, Positive
 from template_control.embedding.planners.planner import Context, Decision, Planner
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot, StrideKind
-from template_control.slip.control.modified_walking import Aim, AngleSearch, search_angle
+from template_control.slip.control.modified_walking import Aim, search_angle
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import GaitFamily, WalkingGait, without_push_off
@@ -83,7 +83,7 @@ class ModifiedPlanner(Planner):
         top = np.arcsin(min(z[1] / p.rest_length, 1.0)) - o.top_margin
         high = min(nominal + o.angle_range[1], top, max(angles[1], nominal + o.angle_range[0]))
         low = min(max(nominal + o.angle_range[0], angles[0]), high)
-        search = AngleSearch(min(max(nominal, low), high), low, high, p.leg_stiffness)
+        search = min(max(nominal, low), high), low, high, p.leg_stiffness
         aim = Aim(self.gait.vlo, self._stiffness)
         outcome, alpha, kappa_2, residual = search_angle(
             self._kernel, closed_form(o.map_kind), z, aim, search, self._scratch, predicted

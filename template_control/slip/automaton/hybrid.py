@@ -107,9 +107,6 @@ def pack(nodes: Sequence[Node]) -> Tables:
     return Tables(rear, front, first_edge, event, target, reset, outcome)
 
 
-__all__ = ["Automaton", "Edge", "Node"]
-
-
 _BEGINS = {Phase.F: Event.APEX, Phase.SS: Event.VLO, Phase.DS: Event.REST}
 """The section at which a stride begins, by the phase of its first node."""
 
@@ -181,22 +178,17 @@ class Automaton:
         Raises:
             ParameterError: if no section ends it.
         """
-        found = self._sections.get(start)
-        if found is None:
-            found = self._sections[start] = self._find_sections(start)
-        return found
+        if start not in self._sections:
+            edges = [edge for node in self.stride(start) for edge in node.edges if edge.section]
+            if not edges:
+                raise ParameterError(f"no section ends a stride from {start}: mark an edge of it")
+            self._sections[start] = _BEGINS[self.node(start).phase], edges[0].event
+        return self._sections[start]
 
     @cached_property
     def _sections(self) -> dict[str, tuple[Event, Event]]:
         """Those found so far: a robot's plans ask for them several times a stride."""
         return {}
-
-    def _find_sections(self, start: str) -> tuple[Event, Event]:
-        begin = _BEGINS[self.node(start).phase]
-        ends = [edge.event for node in self.stride(start) for edge in node.edges if edge.section]
-        if not ends:
-            raise ParameterError(f"no section ends a stride from {start}: mark one of its edges")
-        return begin, ends[0]
 
     def before(self, node_name: str) -> Node:
         """The node that leads to the section at which ``node_name`` begins.

@@ -63,26 +63,20 @@ class StepSolution:
 
 @dataclass(frozen=True)
 class Design:
-    """A controller's stride, its free controls, and where its search begins.
+    """A controller's stride, its free controls, and where its search begins."""
 
-    Attributes:
-        stride: key of ``STRIDE_START``.
-        free: the controls that it chooses.
-        axes: values over whose product the search begins, by the controls that share them [deg,
-            k0]. All other controls are 70 deg and k0.
-        dense: whether that grid shows every minimum; then only a guess that reaches the target is
-            taken without looking at it.
-        margin: the touchdown angle stays this far below asin(y / l0), at which the leg is on the
-            ground at once [rad]; None: it may be steeper.
-        compression: wanted length of the leg at the bottom [l0]; None: any.
-    """
-
-    stride: str
+    stride: str  # key of STRIDE_START
     free: tuple[Slot, ...]
+    # Values over whose product the search begins, by the controls that share them [deg, k0]. All
+    # other controls are 70 deg and k0.
     axes: Mapping[tuple[Slot, ...], ArrayLike]
+    # Whether that grid shows every minimum; then only a guess that reaches the target is taken
+    # without looking at it.
     dense: bool = False
+    # The touchdown angle stays this far below asin(y / l0), at which the leg is on the ground at
+    # once [rad]; None: it may be steeper.
     margin: float | None = None
-    compression: float | None = None
+    compression: float | None = None  # wanted length of the leg at the bottom [l0]; None: any
 
     def table(self, parameters: SlipParameters) -> Array:
         """(4, f) of a :class:`~.stride_solver.Prior`, whose base each start of the search is."""

@@ -40,15 +40,6 @@ class Aim(NamedTuple):
     stiffness_range: Array
 
 
-class AngleSearch(NamedTuple):
-    """Parameters of :func:`search_angle`."""
-
-    nominal: float  # angle of the step after the first [rad]
-    least: float  # angle to try [rad]
-    greatest: float
-    kappa_1: float  # stiffness before the virtual bottom [N/m]
-
-
 @compiled
 def modified_step(
     kernel: Kernel,
@@ -88,7 +79,7 @@ def search_angle(
     kind: int | None,
     z: Array,
     aim: Aim,
-    search: AngleSearch,
+    search: tuple[float, float, float, float],
     scratch: Scratch,
     z_next: Array,
 ) -> tuple[int, float, float, float]:
@@ -96,13 +87,14 @@ def search_angle(
 
     A step is judged with the one after it (at the nominal angle), so that of two poor steps the one
     is taken from which the gait can be reached; ``z_next`` (3,) is overwritten with its end.
-    Returns outcome, alpha [rad], kappa_2 [N/m] and the squared residual of the first step.
+    ``search`` are the nominal angle, the least and the greatest one to try [rad], and kappa_1
+    [N/m]. Returns outcome, alpha, kappa_2 and the squared residual of the first step.
     """
     z1, z2, u = np.empty(RESULTS), np.empty(RESULTS), np.zeros(NUM_SLOTS)
-    target, nominal, kappa_1 = aim.target, search.nominal, search.kappa_1
+    target, (nominal, least, greatest, kappa_1) = aim.target, search
     best_cost, best_alpha, best_kappa, best_residual = np.inf, nominal, kappa_1, np.inf
     best_outcome = -1
-    low, high = search.least, search.greatest
+    low, high = least, greatest
     for grid in range(_GRIDS):
         count = _COARSE if grid == 0 else _FINE
         for i in range(count):
@@ -124,8 +116,8 @@ def search_angle(
                 for j in range(3):
                     z_next[j] = z1[j]
         width = (high - low) / (count - 1)
-        low = max(search.least, best_alpha - _NARROWING * width)
-        high = min(search.greatest, best_alpha + _NARROWING * width)
+        low = max(least, best_alpha - _NARROWING * width)
+        high = min(greatest, best_alpha + _NARROWING * width)
     return best_outcome, best_alpha, best_kappa, best_residual
 
 

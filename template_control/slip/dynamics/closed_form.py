@@ -6,8 +6,6 @@ single stance (11) and double stance (Algorithm 1), in two iterations.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from template_control.arrays import Array
@@ -18,11 +16,14 @@ from template_control.slip.dynamics.guards import (
     FLIGHT,
     STANCE,
     Path,
+    Watch,
     all_bends,
+    arm,
+    first_event,
+    root,
     sample,
 )
 from template_control.slip.dynamics.kernel import Scratch, apply_reset, enter, note_lengths
-from template_control.slip.dynamics.locate import Watch, arm, first_event, root
 from template_control.slip.dynamics.model import Kernel, backward
 
 _NEWTON = 6
@@ -61,19 +62,10 @@ def axial_torsional(
     return k_r, top, k_t / (8.0 * rest_length**2)
 
 
-class Launch(NamedTuple):
-    """Start of a stance phase: the CoM in polar coordinates about x of a pivot, and dr/dt."""
-
-    pivot: float
-    r: float
-    theta: float
-    radial_speed: float
-
-
 @inner
 def harmonic(
     a: Array,
-    start: Launch,
+    start: tuple[float, float, float, float],
     momentum: float,
     frequency_squared: float,
     length: float,
@@ -81,6 +73,7 @@ def harmonic(
 ) -> None:
     """Coefficients of (11) into ``a`` (12,), see :class:`~.guards.Path`.
 
+    A stance starts at x of a pivot, the CoM in polar coordinates about it, and dr/dt [m, rad, m/s].
     ``momentum`` is p / m [m^2/s], ``frequency_squared`` k / m, ``length`` l0, or l_r0 of the AT.
     """
     pivot, r, theta, radial_speed = start
@@ -278,7 +271,7 @@ def _stance(
     radial = state[2] * c + state[3] * s
     momentum = r * (state[3] * c - state[2] * s)
     w2 = k / mass
-    start = Launch(pivot, r, theta, radial)
+    start = (pivot, r, theta, radial)
     harmonic(a, start, momentum, w2, length, gravity)
     path = Path(a, a)
     horizon, accuracy = kernel.max_time, _EVENT_TIME

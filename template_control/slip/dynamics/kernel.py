@@ -14,8 +14,16 @@ from template_control.arrays import Array, BoolArray
 from template_control.compiled import inner
 from template_control.slip.automaton.hybrid import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
-from template_control.slip.dynamics.guards import COEFFICIENTS, SERIES, Path, all_bends, sample
-from template_control.slip.dynamics.locate import Watch, arm, first_event
+from template_control.slip.dynamics.guards import (
+    COEFFICIENTS,
+    SERIES,
+    Path,
+    Watch,
+    all_bends,
+    arm,
+    first_event,
+    sample,
+)
 from template_control.slip.dynamics.model import ORDER, Kernel, expand, steepest
 
 MAX_SEGMENTS = 96

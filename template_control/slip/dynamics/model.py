@@ -20,27 +20,16 @@ from template_control.slip.parameters import SlipParameters
 
 
 class Kernel(NamedTuple):
-    """A kind of stride of one template: the packed automaton, the physics, and the first node.
-
-    Attributes:
-        tables: of the automaton.
-        mass: [kg].
-        gravity: into the ground [m/s^2].
-        along: gravity along the ground, backward positive [m/s^2].
-        assist: forward acceleration that two legs add to their springs' [m/s^2].
-        rest_length: l0 [m].
-        max_time: a stride that takes longer counts as failed [s].
-        node: index of the first node.
-    """
+    """A kind of stride of one template: the packed automaton, the physics, and the first node."""
 
     tables: Tables
-    mass: float
-    gravity: float
-    along: float
-    assist: float
-    rest_length: float
-    max_time: float
-    node: int
+    mass: float  # [kg]
+    gravity: float  # into the ground [m/s^2]
+    along: float  # gravity along the ground, backward positive [m/s^2]
+    assist: float  # forward acceleration that two legs add to their springs' [m/s^2]
+    rest_length: float  # l0 [m]
+    max_time: float  # a stride that takes longer counts as failed [s]
+    node: int  # index of the first node
 
 
 def node_kernel(

@@ -131,20 +131,13 @@ class Equations(NamedTuple):
 
 
 class Branch(ABC):
-    """A curve of gaits that can be followed.
+    """A curve of gaits that can be followed."""
 
-    Attributes:
-        scale: (n + 1,) natural size of each coordinate.
-        free: quantities that vary along it.
-        noise: accuracy of eigenvalues. One that is this close to the unit circle does not count as
-            crossing it.
-        anchor: (n + 1,) scaled direction in which the first gait stays where its guess is; None
-            where the nearest gait will do.
-    """
-
-    scale: Array
-    free: tuple[str, ...]
-    noise: float = 0.0
+    scale: Array  # (n + 1,) natural size of each coordinate
+    free: tuple[str, ...]  # quantities that vary along it
+    noise: float = 0.0  # an eigenvalue this close to the unit circle does not count as crossing it
+    # (n + 1,) scaled direction in which the first gait stays where its guess is; None where the
+    # nearest gait will do.
     anchor: Array | None = None
 
     @abstractmethod
@@ -191,9 +184,7 @@ class Branch(ABC):
 
         ``start`` (n + 1,) is a guess of X. ``over`` is the quantity that the branch is drawn over:
         folds are where it turns back, and the branch ends outside of its ``limits``. ``step`` is
-        the largest arclength step, in scaled units; there are at most ``points`` each way. A
-        GaitError if there is no gait near ``start``, a ParameterError if ``over`` does not vary
-        along the branch.
+        the largest arclength step, in scaled units; there are at most ``points`` each way.
         """
         if over not in self.free:
             raise ParameterError(

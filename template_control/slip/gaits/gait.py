@@ -1,4 +1,7 @@
-"""Walking gaits: period-one fixed points of the VLO return map, symmetric in time."""
+"""Walking gaits: period-one fixed points of the VLO return map, symmetric in time.
+
+On a slope, what the climb takes, the legs give in double stance.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,7 @@ from template_control.slip.automaton.vocabulary import (
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, section_of
-from template_control.slip.parameters import SlipParameters
+from template_control.slip.parameters import SlipParameters, Slope
 
 WALKING_SLOTS: dict[str, tuple[Slot, ...]] = {
     StrideKind.WALK: (Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD),
@@ -40,7 +43,6 @@ WALKING_SLOTS: dict[str, tuple[Slot, ...]] = {
 _ANGLES = np.arange(60.0, 77.5, 0.5).tolist()  # [deg] where gaits are looked for
 _SPEEDS = np.linspace(0.2, 0.45, 26).tolist()  # at VLO, over sqrt(g l0)
 _SCAN = 120
-_LEVEL, _HEIGHT = 0, 1  # places in what a stride misses
 
 
 @dataclass(frozen=True)
@@ -188,7 +190,7 @@ def _symmetric_roots(
         return _misses(step, *make(value))[which]
 
     samples = np.array([_misses(step, *make(v)) for v in values])
-    for which in (_LEVEL, _HEIGHT):
+    for which in range(2):
         found = []
         misses = samples[:, which]
         for ends, (f_lo, f_hi) in zip(pairwise(values), pairwise(misses), strict=True):
@@ -280,6 +282,90 @@ def gait_from_energy(parameters: SlipParameters, height: float, energy: float) -
     if not roots:
         raise GaitError(f"no walking gait with VLO height {height:g} m and energy {energy:g} J")
     return _gait(parameters, *roots[-1], name="paper")
+
+
+_ROUNDS = 12
+_DONE = 1e-9
+_DIFFERENCE = 1e-4  # of g, to differentiate by the assist
+# Weights of squared changes: y over l0, dy/dt over sqrt(g l0), the angle [rad], stiffnesses over
+# k0. The assist may be what it must.
+_HEIGHT, _RISE, _ANGLE, _STIFFNESS, _ASSIST = 4e4, 1e4, 1e3, 1e2, 1e-4
+
+
+@checked
+def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
+    """The gait with the same speed at VLO on a slope, and as near to a gait as there is.
+
+    The template's axes are turned with the ground. In single stance gravity's part along the ground
+    acts; in double stance the assist (:class:`~template_control.slip.parameters.SlipParameters`)
+    gives back what that takes in a step. So the motion stays nearly that on level ground. Of
+    all fixed points the one with the least change of state and controls is taken.
+
+    Args:
+        gait: on level ground.
+        slope: angle of the ground, uphill positive [rad].
+
+    Raises:
+        GaitError: if there is none.
+    """
+    p = gait.parameters
+    if slope == p.slope:
+        return gait
+    slots, units = control_units(gait)
+    weights = np.array([_HEIGHT / p.rest_length**2, _RISE / p.speed_unit**2, _ANGLE])
+    weights = np.append(weights, [_STIFFNESS] * (len(slots) - 1))
+    weights = np.append(weights, _ASSIST / p.gravity**2)
+    wanted = np.concatenate((gait.vlo[1:], gait.controls[slots] / units, [p.assist]))
+    x = wanted.copy()
+    for _ in range(_ROUNDS):
+        z, u, assist = _unpacked(gait, x)
+        own = replace(p, slope=slope, assist=assist)
+        here = ReturnMap(own, gait.stride).linearise(z, u)
+        change = _DIFFERENCE * p.gravity
+        pushed = replace(own, assist=assist + change)
+        there, outcome = ReturnMap(pushed, gait.stride).step(z, u)
+        if Outcome.SECTION not in (here.outcome, outcome):
+            break
+        by_state = (here.state_jacobian - np.eye(3))[:, 1:]
+        by_controls = here.control_jacobian[:, slots] * units
+        by_assist = (there - here.state)[:, None] / change
+        slopes = np.hstack((by_state, by_controls, by_assist))
+        step = _least_change(weights, wanted - x, slopes, z - here.state)
+        x += step
+        if np.max(np.abs(step)) < _DONE:
+            return _gait_on_slope(gait, slope, x)
+    raise GaitError(
+        f"no walking gait with {gait.vlo[0]:.3g} m/s at VLO on a slope of"
+        f" {np.degrees(slope):.3g} deg: take a gentler slope"
+    )
+
+
+def _unpacked(gait: WalkingGait, x: Array) -> tuple[Array, Array, float]:
+    """VLO state, controls by Slot and assist of the unknowns ``x``."""
+    slots, units = control_units(gait)
+    u = gait.controls.copy()
+    u[slots] = x[2:-1] * units
+    return np.array([gait.vlo[0], *x[:2]]), u, float(x[-1])
+
+
+def _least_change(weights: Array, wanted: Array, slopes: Array, missing: Array) -> Array:
+    """The step s with slopes s = missing and the least weighted distance from ``wanted``."""
+    n, m = len(weights), len(missing)
+    kkt = np.zeros((n + m, n + m))
+    kkt[:n, :n] = np.diag(weights)
+    kkt[:n, n:], kkt[n:, :n] = slopes.T, slopes
+    solution = np.linalg.solve(kkt, np.concatenate((weights * wanted, missing)))
+    return np.asarray(solution[:n], dtype=np.float64)
+
+
+def _gait_on_slope(gait: WalkingGait, slope: float, x: Array) -> WalkingGait:
+    z, u, assist = _unpacked(gait, x)
+    own = replace(gait.parameters, slope=slope, assist=assist)
+    step = simulate_stride(own, STRIDE_START[gait.stride], VLO.state(z), u)
+    length = float(step.state[0])
+    return replace(
+        gait, parameters=own, state=z, controls=u, step_length=length, step_duration=step.duration
+    )
 
 
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:

@@ -17,15 +17,7 @@ from template_control.checks.ranges import Vector
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.control.controllers import VARIED, TargetedPolicy
-from template_control.slip.gaits.branch import (
-    QUANTITIES,
-    Branch,
-    BranchPoint,
-    Equations,
-    classify,
-    null_vector,
-    shell_eigenvalues,
-)
+from template_control.slip.gaits import branch
 from template_control.slip.maps.return_map import Linearisation, ReturnMap
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
@@ -33,7 +25,7 @@ from template_control.slip.parameters import SlipParameters
 _COORDINATE = {"angle": -2, "stiffness": -1, "height": 1, "speed": 0}
 
 
-class Family(Branch):
+class Family(branch.Branch):
     """One-parameter family of passive gaits with two quantities held fixed.
 
     Args:
@@ -49,17 +41,17 @@ class Family(Branch):
     def __init__(self, parameters: SlipParameters, stride: str, fixed: Mapping[str, float]) -> None:
         if stride not in (StrideKind.WALK, StrideKind.RUN):
             raise ParameterError(f"stride is {stride!r}: periodic gaits are 'w' or 'r'")
-        if len(fixed) != 2 or not set(fixed) <= set(QUANTITIES):
+        if len(fixed) != 2 or not set(fixed) <= set(branch.QUANTITIES):
             raise ParameterError(
                 f"fixed quantities are {', '.join(fixed) or 'none'}: give two of"
-                f" {', '.join(QUANTITIES)}"
+                f" {', '.join(branch.QUANTITIES)}"
             )
         for name, value in fixed.items():
             if not np.isfinite(value):
                 raise ParameterError(f"{name} is {value!r}: give a finite number")
         self.parameters = parameters
         self.fixed = dict(fixed)
-        self.free = tuple(q for q in QUANTITIES if q not in fixed)
+        self.free = tuple(q for q in branch.QUANTITIES if q not in fixed)
         self.map = ReturnMap(parameters, stride)
         self.section = self.map.sections[0]
         self.n = self.section.dimension
@@ -68,23 +60,23 @@ class Family(Branch):
         self.scale = np.array([*[speed, p.rest_length, speed][: self.n], 1.0, p.leg_stiffness])
         self._energy_scale = p.mass * p.gravity * p.rest_length
 
-    def point(self, x: Array) -> BranchPoint:
+    def point(self, x: Array) -> branch.BranchPoint:
         """The branch point at X (n + 2,); its tangent is oriented arbitrarily."""
         equations, linear = self._linearised(x)
         energy, gradient = self.quantity(x, "energy")
-        eigenvalues = shell_eigenvalues(linear.state_jacobian, gradient[: self.n])
-        return BranchPoint(
+        eigenvalues = branch.shell_eigenvalues(linear.state_jacobian, gradient[: self.n])
+        return branch.BranchPoint(
             x=x.copy(),
             state=x[: self.n].copy(),
             controls=self._controls(x),
             energy=energy,
             target=None,
             eigenvalues=eigenvalues,
-            kind=classify(eigenvalues),
-            tangent=null_vector(equations.jacobian),
+            kind=branch.classify(eigenvalues),
+            tangent=branch.null_vector(equations.jacobian),
         )
 
-    def equations(self, x: Array) -> Equations:
+    def equations(self, x: Array) -> branch.Equations:
         """Residual (n + 1,) and Jacobian at X: the stride returns, two quantities are held."""
         return self._linearised(x)[0]
 
@@ -107,7 +99,7 @@ class Family(Branch):
         u[[Slot.K_SC, Slot.K_SD]] = x[-1]
         return u
 
-    def _linearised(self, x: Array) -> tuple[Equations, Linearisation]:
+    def _linearised(self, x: Array) -> tuple[branch.Equations, Linearisation]:
         n = self.n
         linear = self.map.linearise(x[:n], self._controls(x))
         stiffness = linear.control_jacobian[:, [Slot.K_SC, Slot.K_SD]].sum(axis=1)
@@ -127,7 +119,7 @@ class Family(Branch):
             residual = np.append(residual, (held - value) / size)
             rows = np.vstack((rows, gradient / size))
         valid = linear.outcome is Outcome.SECTION
-        return Equations(residual, rows * self.scale, valid), linear
+        return branch.Equations(residual, rows * self.scale, valid), linear
 
 
 def energy_gradient(
@@ -147,7 +139,7 @@ _DIFFERENCE = 1e-6
 _NOISE = 1e-5  # of eigenvalues: a controller's search ends at 1e-10, over the difference
 
 
-class ControlledFamily(Branch):
+class ControlledFamily(branch.Branch):
     """Gaits that a controlled stride returns to, over its controller's target.
 
     The map's derivatives are exact; the policy's, which may hide an optimisation, are central
@@ -184,33 +176,35 @@ class ControlledFamily(Branch):
         self.scale = np.array([*[speed, p.rest_length, speed][: self.n], target])
         self.anchor = np.eye(self.n + 1)[-1]
 
-    def equations(self, x: Array) -> Equations:
+    def equations(self, x: Array) -> branch.Equations:
         """Residual (n,) and Jacobian of z = P(z, u(z, target))."""
         z, target = x[:-1], float(x[-1])
         linear, closed, _ = self._closed(x)
         valid = linear.outcome is Outcome.SECTION
         if not valid:
-            return Equations(np.full(self.n, np.nan), np.zeros((self.n, self.n + 1)), valid)
+            return branch.Equations(np.full(self.n, np.nan), np.zeros((self.n, self.n + 1)), valid)
         h = _DIFFERENCE * self.scale[-1]
         by_target = (self.policy(z, target + h) - self.policy(z, target - h)) / (2.0 * h)
         rows = np.column_stack((closed - np.eye(self.n), linear.control_jacobian @ by_target))
         scale = self.scale[:-1]
-        return Equations((linear.state - z) / scale, rows * self.scale / scale[:, None], valid)
+        return branch.Equations(
+            (linear.state - z) / scale, rows * self.scale / scale[:, None], valid
+        )
 
-    def point(self, x: Array) -> BranchPoint:
+    def point(self, x: Array) -> branch.BranchPoint:
         """The branch point at X (n + 1,); its tangent is oriented arbitrarily."""
         _, closed, u = self._closed(x)
         eigenvalues = np.linalg.eigvals(closed).astype(np.complex128)
         p = self.map.parameters
-        return BranchPoint(
+        return branch.BranchPoint(
             x=x.copy(),
             state=x[:-1].copy(),
             controls=u,
             energy=float(self.map.sections[0].energy(p, x[:-1])),
             target=float(x[-1]),
             eigenvalues=eigenvalues,
-            kind=classify(eigenvalues, _NOISE),
-            tangent=null_vector(self.equations(x).jacobian),
+            kind=branch.classify(eigenvalues, _NOISE),
+            tangent=branch.null_vector(self.equations(x).jacobian),
         )
 
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:

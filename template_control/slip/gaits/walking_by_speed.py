@@ -268,19 +268,6 @@ def other_walks(gait: WalkingGait) -> tuple[float, float, Callable[..., WalkingG
 _VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
 
 
-def _mean_speeds(parameters: SlipParameters, touchdown_angle: float) -> tuple[float, float] | None:
-    """Slowest and fastest mean speed of gaits with an angle [m/s], to a centimetre per second."""
-    ends = []
-    for speeds in (_VLO_SPEEDS, _VLO_SPEEDS[::-1]):
-        means = (
-            _mean_speed(parameters, touchdown_angle, parameters.speed_unit * s) for s in speeds
-        )
-        ends.append(next((mean for mean in means if np.isfinite(mean)), np.nan))
-    if not np.isfinite(ends).all():
-        return None
-    return float(np.ceil(100.0 * ends[0]) / 100.0), float(np.floor(100.0 * ends[1]) / 100.0)
-
-
 def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> float:
     """Of the gait that :func:`find_gait_at` finds [m/s]; NaN if it finds none."""
     gait = find_gait_at(parameters, touchdown_angle, vlo_speed)
@@ -318,16 +305,17 @@ def gait_for_speed(
 
     # The mean speed grows with the speed at VLO; find two neighbours around the wanted one.
     speeds = unit * _VLO_SPEEDS
-    values = np.array([surplus(s) for s in speeds])
+    means = np.array([_mean_speed(p, angle, s) for s in speeds])
+    values = means - mean_speed
     for lo, hi, f_lo, f_hi in zip(speeds, speeds[1:], values, values[1:], strict=False):
         if f_lo <= 0.0 <= f_hi:
             speed = root(surplus, (lo, hi), _XTOL, _RTOL)
             if speed is not None:
                 return gait_at(p, angle, speed)
-    found = _mean_speeds(p, angle)
+    known, hint = means[np.isfinite(means)], "give another angle, or none"
+    if len(known):
+        low, high = np.ceil(100.0 * known[0]) / 100.0, np.floor(100.0 * known[-1]) / 100.0
+        if not low <= mean_speed <= high:
+            hint = f"give one from {low:.2f} to {high:.2f} m/s"
     at = f" and {np.degrees(angle):g} deg at touchdown"
-    if found is not None and not found[0] <= mean_speed <= found[1]:
-        hint = f"give one from {found[0]:.2f} to {found[1]:.2f} m/s"
-    else:
-        hint = "give another angle, or none"
     raise GaitError(f"no walking gait at a mean speed of {mean_speed:g} m/s{at}: {hint}")

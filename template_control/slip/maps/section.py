@@ -16,7 +16,6 @@ from template_control.slip.parameters import SlipParameters
 PADDED = 3
 """Size of a padded state: dx/dt, y, dy/dt."""
 
-_DY = 3  # place of dy/dt in a state x, y, dx/dt, dy/dt
 _MIRROR = np.array([1.0, 1.0, -1.0])
 
 
@@ -128,10 +127,8 @@ class Section:
             highest: height that it may have at most [m].
         """
         calm = np.array(z, dtype=float)
-        for place, quantity in enumerate(self.order):
-            if quantity == _DY:
-                calm[1] = min(calm[1], highest)
-                calm[place] *= share
+        if self.dimension == PADDED:
+            calm[1:] = min(calm[1], highest), share * calm[2]
         return calm
 
     def _spring(self, p: SlipParameters, y: Array, stiffness: ArrayLike | None) -> Array | float:

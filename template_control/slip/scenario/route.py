@@ -108,6 +108,8 @@ class SteadyRoute:
             of a wrong shape or with a number that is not finite.
     """
 
+    endless = True
+
     @checked
     def __init__(
         self,
@@ -139,11 +141,6 @@ class SteadyRoute:
             automaton: that its stride is of.
         """
         return cls(gait.parameters, gait.stride, gait.state, automaton=automaton)
-
-    @property
-    def endless(self) -> bool:
-        """See :class:`Route`."""
-        return True
 
     def reset(self) -> None:
         """Do nothing: every stride is alike."""

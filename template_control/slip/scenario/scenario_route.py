@@ -114,6 +114,8 @@ class ScenarioRoute:
             stride of its own, and a step closes the feet.
     """
 
+    endless = False
+
     @checked
     def __init__(
         self,
@@ -137,11 +139,6 @@ class ScenarioRoute:
         self._guess = _FIRST_DURATION * np.sqrt(p.rest_length / p.gravity)
         self._unit = p.speed_unit
         self.reset()
-
-    @property
-    def endless(self) -> bool:
-        """See :class:`Route`."""
-        return False
 
     @property
     def pushes_off(self) -> bool:

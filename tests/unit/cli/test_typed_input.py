@@ -16,8 +16,7 @@ from template_control.checks.fitting import inward
 from template_control.checks.typed import entries, number
 from template_control.cli.main import _COMMANDS, build_parser
 from template_control.errors import GaitError, ParameterError, RecordError, RobotError
-from template_control.plant.terrain import Terrain
-from template_control.plant.terrain_spec import KINDS, terrain_from
+from template_control.plant.terrain import KINDS, Terrain, terrain_from
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robustness.campaign import DisturbanceDistribution
 from template_control.run.experiment import Experiment

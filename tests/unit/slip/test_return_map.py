@@ -11,7 +11,6 @@ from template_control.paper.map_errors import Grid, study
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome
 from template_control.slip.dynamics.closed_form import (
-    Launch,
     axial_torsional,
     harmonic,
     momentum_changes,
@@ -214,7 +213,7 @@ def test_double_stance_constants_solve_the_papers_equations():
 def test_momentum_changes_are_the_integrals_they_stand_for():
     """(13) and (27) are exact integrals of (11); (12) is the trapezoid of gravity's torque."""
     a, t = np.zeros(COEFFICIENTS), 0.12
-    harmonic(a, Launch(0.3, 0.96, 1.7, -0.2), -1.05, K0 / P.mass, 0.97, P.gravity)
+    harmonic(a, (0.3, 0.96, 1.7, -0.2), -1.05, K0 / P.mass, 0.97, P.gravity)
 
     def polar(time):
         out = np.empty(6)
