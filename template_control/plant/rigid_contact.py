@@ -22,10 +22,10 @@ from itertools import chain, combinations
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
 from template_control.plant.terrain import Terrain
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.whole_body.elimination import eliminate
 
 _ROUNDING = 1e-9  # relative: forces and accelerations this small have no sign
 
@@ -38,64 +38,16 @@ def solve(
     ``jacobian`` (n, 2, nv) and ``gamma`` (n, 2) have two rows of each contact. A LinAlgError if
     those of the held ones depend on each other.
     """
-    held = tuple(i in pressed for i in range(len(gamma)))
-    determined, x, force = _solution(mass_matrix, right, jacobian, gamma, held)
-    if not determined:
-        raise np.linalg.LinAlgError("the contacts' rows depend on each other")
-    return x, force
-
-
-@compiled
-def _solution(
-    mass_matrix: Array, right: Array, jacobian: Array, gamma: Array, held: tuple[bool, ...]
-) -> tuple[bool, Array, Array]:
-    """Whether the contacts' rows determine f, and x and f, as :func:`solve`.
-
-    With A = J M^-1 J^T: A f = -gamma - J M^-1 right, and x = M^-1 (right + J^T f).
-    """
-    # Number by number: Numba compiles operations on whole arrays for seconds.
-    nv, contacts, count = right.shape[0], gamma.shape[0], 0
-    rows, known = np.empty((2 * contacts, nv)), np.empty((2 * contacts, 1))
-    for i in range(contacts):
-        if held[i]:
-            for axis in range(2):
-                known[count, 0] = -gamma[i, axis]
-                for k in range(nv):
-                    rows[count, k] = jacobian[i, axis, k]
-                count += 1
-    factor, columns = np.empty((nv, nv)), np.empty((nv, 1 + count))
-    for k in range(nv):
-        columns[k, 0] = right[k]
-        for row in range(count):
-            columns[k, 1 + row] = rows[row, k]
-        for j in range(k + 1):
-            factor[k, j] = mass_matrix[k, j]
-    cholesky(factor, nv)
-    solve_cholesky(factor, nv, columns)
-    gram, finite = np.empty((count, count)), True
-    for row in range(count):
-        for k in range(nv):
-            known[row, 0] -= rows[row, k] * columns[k, 0]
-        for other in range(row + 1):
-            total = 0.0
-            for k in range(nv):
-                total += rows[row, k] * columns[k, 1 + other]
-            gram[row, other] = total
-            finite = finite and np.isfinite(total)
-    # What is not finite has no solution, and is no fault of the contacts.
-    determined = cholesky(gram, count) or not finite
-    solve_cholesky(gram, count, known)
-    x, force, row = np.empty(nv), np.zeros((contacts, 2)), 0
-    for k in range(nv):
-        x[k] = columns[k, 0]
-        for other in range(count):
-            x[k] += columns[k, 1 + other] * known[other, 0]
-    for i in range(contacts):
-        if held[i]:
-            for axis in range(2):
-                force[i, axis] = known[row, 0]
-                row += 1
-    return determined, x, force
+    nv, held = len(right), list(pressed)
+    rows = jacobian[held].reshape(-1, nv)
+    x, force, found = np.empty((nv, 1)), np.empty((len(rows), 1)), np.zeros_like(gamma)
+    if not eliminate(mass_matrix, -right, rows, gamma[held].ravel(), nv, x, force):
+        # What is not finite has no solution, and is no fault of the contacts.
+        if np.isfinite(mass_matrix).all() and np.isfinite(rows).all():
+            raise np.linalg.LinAlgError("the contacts' rows depend on each other")
+        x[:] = force[:] = np.nan
+    found[held] = force.reshape(-1, 2)
+    return x[:, 0], found
 
 
 def pressing(

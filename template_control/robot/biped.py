@@ -116,20 +116,8 @@ class Biped(Robot):
     ankle_height = Number("ankle_height")
     toe_ahead = Number("toe_ahead")
     trunk_com: float
-    com: Array
-    com_velocity: Array
-    com_jacobian: Array
-    com_bias: Array
     angular_momentum = Number("momentum", 1)
-    angular_momentum_jacobian: Array
     angular_momentum_bias = Number("momentum_bias", 1)
-    foot_position: Array
-    foot_velocity: Array
-    contact_position: Array
-    contact_velocity: Array
-    contact_jacobian: Array
-    contact_bias: Array
-    hips: Array
     hip_speed = Number("hip_speed")
     pitch = Number("attitude", 1)
     pitch_rate = Number("turning", 1)
@@ -221,22 +209,20 @@ class Biped(Robot):
 
     def _look(self) -> None:
         """Take the views that Python reads; Pinocchio keeps its arrays in place."""
-        j, now, step = self.jacobians, self.data, _SAGITTAL[self.directions]
-        self.com, self.com_velocity, self.com_bias = (
-            now[name][0, ::UP] for name in ("com", "com_velocity", "com_bias")
-        )
-        self.com_jacobian = j.com[::step]
-        self.angular_momentum_jacobian = j.momentum[len(j.momentum) // 2]
-        self.foot_position, self.foot_velocity = (
-            now[name][0, :, ::UP] for name in ("foot_position", "foot_velocity")
-        )
-        contacts, every = len(self.feet), UP // step
-        self.contact_position, self.contact_velocity, self.contact_bias = (
-            now[f"contact_{name}"][0, :contacts, : max(self.contact_rows, UP + 1) : every]
-            for name in ("position", "velocity", "bias")
-        )
-        self.contact_jacobian = j.contact
-        self.hips = now["hips"][0, ::UP]
+        j, now, step = self.jacobians, self.data[0], _SAGITTAL[self.directions]
+        self.com: Array = now["com"][::UP]
+        self.com_velocity: Array = now["com_velocity"][::UP]
+        self.com_bias: Array = now["com_bias"][::UP]
+        self.com_jacobian: Array = j.com[::step]
+        self.angular_momentum_jacobian: Array = j.momentum[len(j.momentum) // 2]
+        self.foot_position: Array = now["foot_position"][:, ::UP]
+        self.foot_velocity: Array = now["foot_velocity"][:, ::UP]
+        own = slice(len(self.feet)), slice(0, max(self.contact_rows, UP + 1), UP // step)
+        self.contact_position: Array = now["contact_position"][own]
+        self.contact_velocity: Array = now["contact_velocity"][own]
+        self.contact_bias: Array = now["contact_bias"][own]
+        self.contact_jacobian: Array = j.contact
+        self.hips: Array = now["hips"][::UP]
 
     @property
     def paired(self) -> bool:
