@@ -86,7 +86,7 @@ class StrideProblem(NamedTuple):
     aim: Array  # (m,) where it should end
     weights: Array  # (m, m) W
     controls: Array  # (NUM_SLOTS,) u, of which the free ones are overwritten
-    slots: IntArray  # (f,) of the free ones, of which are the next four
+    slots: IntArray  # (f,) of the free ones, whose the next four are
     base: Array
     change: Array
     lower: Array
