@@ -15,7 +15,7 @@ from typing import Any
 from template_control import settings
 from template_control.checks import option_types as values
 from template_control.cli.flags import ALL, GAIT, OWN_URDF, PLANNERS, STANDS, Flag
-from template_control.embedding.free.options import ahead_options, lqr_options
+from template_control.embedding.free.options import KINDS
 from template_control.embedding.planners.ahead import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
@@ -140,5 +140,5 @@ def _planner(name: str, base: Experiment) -> Any:
         return OwnPlanner(name)
     if getattr(base.planner, "kind", None) == name:
         return base.planner
-    of_kind = {LqrOptions.kind: lqr_options, AheadOptions.kind: ahead_options}
-    return of_kind[name](base.tuning) if name in of_kind else PLANNERS[name]()
+    kind = KINDS[base.tuning.kind]
+    return {LqrOptions.kind: kind.lqr, AheadOptions.kind: kind.ahead}.get(name) or PLANNERS[name]()

@@ -17,12 +17,9 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.motion import Course
 from template_control.embedding.free.options import (
+    KINDS,
     AnyOptions,
-    SoleOptions,
-    TrotOptions,
-    ahead_options,
     default_options,
-    lqr_options,
     options_of_kind,
 )
 from template_control.embedding.options import EmbeddingOptions
@@ -206,18 +203,15 @@ class Experiment(Checked):
         runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
         if runs or isinstance(motion, RunningGait):
             return RunningOptions()
-        kind = self._kind()
-        bears = isinstance(kind, SoleOptions | TrotOptions)
+        kind = KINDS[self._kind().kind]
+        ahead = False
         if isinstance(motion, Scenario):
-            ahead = motion.has_any_speed(bears) and (bears or not self.free)
+            ahead = motion.has_any_speed(kind.bears) and (kind.bears or not self.free)
         elif isinstance(motion, GaitSpec):
-            # On soles it held all 18 of G1's disturbed walks in which the LQR's search fell.
             own = motion.name == "walk" and motion.touchdown_angle is None
             stands = motion.from_stand or motion.to_stand
-            ahead = own and (isinstance(kind, SoleOptions) or (bears and stands))
-        else:
-            ahead = False
-        return ahead_options(kind) if ahead else lqr_options(kind)
+            ahead = own and (kind.walks_ahead or (kind.bears and stands))
+        return kind.ahead if ahead else kind.lqr
 
     def with_(self, keys: Mapping[str, Any]) -> Experiment:
         """The same experiment with some keys set, named as in its TOML file.
@@ -310,7 +304,7 @@ class Experiment(Checked):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
         if planner is None and isinstance(motion, SpeedRoute):
-            planner = ahead_options(self.tuning)
+            planner = KINDS[self.tuning.kind].ahead
         if planner is None:
             return motion, default_planners(motion, standing=standing_options(robot))
         if isinstance(planner, Mapping):

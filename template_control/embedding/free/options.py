@@ -15,7 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.embedding.lean import LeanOptions
@@ -323,7 +323,7 @@ def default_options(robot: Biped) -> AnyOptions:
 
 
 FREE_PLANNER = LqrOptions(earliest_touchdown=0.1, earliest_share=1.0, trusted_price=0.3)
-"""Tuning of a floating-base robot's planner.
+"""Tuning of a floating-base robot's LQR planner.
 
 Its swing leg has to move sideways too, and needs time. Its first steps from a start are further
 from the gait than a planar robot's, and the law of a slow gait is good in its neighbourhood only:
@@ -335,15 +335,24 @@ at 0.4 m/s it led Bolt from an error of 2 mm to one of 0.1 m/s. So the search be
 _SOLE_PLANNER = replace(FREE_PLANNER, earliest_touchdown=0.15, earliest_share=0.2)
 
 
-def lqr_options(options: EmbeddingOptions) -> LqrOptions:
-    """Tuning of the LQR planner for the kind of robot whose controller has these options."""
-    if isinstance(options, SoleOptions):
-        return _SOLE_PLANNER
-    return FREE_PLANNER if isinstance(options, FreeOptions) else LqrOptions()
+class KindOfRobot(NamedTuple):
+    """Planners' tuning for a kind of robot.
+
+    ``walks_ahead``: whether a walk that is kept is planned ahead; ``bears``: whether its feet bear
+    the centre of pressure around them.
+    """
+
+    lqr: LqrOptions
+    ahead: AheadOptions
+    walks_ahead: bool = False
+    bears: bool = False
 
 
-def ahead_options(options: EmbeddingOptions) -> AheadOptions:
-    """Tuning of the planner that looks ahead for the kind of robot that has these options."""
-    if isinstance(options, TrotOptions):
-        return FREE_AHEAD
-    return BIPED_AHEAD if isinstance(options, FreeOptions) else AheadOptions()
+KINDS: Mapping[str, KindOfRobot] = {
+    EmbeddingOptions.kind: KindOfRobot(LqrOptions(), AheadOptions()),
+    FreeOptions.kind: KindOfRobot(FREE_PLANNER, BIPED_AHEAD),
+    TrotOptions.kind: KindOfRobot(FREE_PLANNER, FREE_AHEAD, bears=True),
+    # Ahead it held all 18 of G1's disturbed walks in which the LQR's search fell.
+    SoleOptions.kind: KindOfRobot(_SOLE_PLANNER, BIPED_AHEAD, walks_ahead=True, bears=True),
+}
+"""By the kind of the controller's options."""
