@@ -114,7 +114,7 @@ def _prepare(robot: Any, under_way: Iterator[int], folder: Path) -> None:
     controller = under_way.gi_frame.f_locals["controller"]  # type: ignore[attr-defined]
     while len(q) < _STATES:
         next(under_way)
-        stance = controller.mode.stance
+        stance = controller.node.stance
         if len(stance) == 1:
             state = controller.frame.raw_state
             q.append(state[0].copy())

@@ -1,11 +1,11 @@
 from .apex_pose import ApexStart as ApexStart
 from .apex_pose import apex_pose as apex_pose
 from .contacts import ContactOptions as ContactOptions
+from .contacts import FrictionOptions as FrictionOptions
 from .controller import EmbeddingController as EmbeddingController
 from .free.options import FREE_PHASES as FREE_PHASES
 from .free.options import FREE_PLANNER as FREE_PLANNER
 from .free.options import FreeOptions as FreeOptions
-from .friction import FrictionOptions as FrictionOptions
 from .lean import Lean as Lean
 from .lean import LeanOptions as LeanOptions
 from .modes import GuardOptions as GuardOptions

@@ -219,11 +219,11 @@ class EmbeddingController:
         self._enter(node.name)
         self.feet.begin(rear)
         half = 0.5 * planner.gait.step_duration
-        for leg in self.mode.swings:
+        for leg in self.mode.control.swings:
             self._lift(self.feet.foot_of_leg[leg], (swung or (half, half))[leg])
         if node.stance:
             # Of two feet on the ground the front one landed last.
-            self.feet.landed = self.feet.foot_of_leg[self.mode.stance[-1]]
+            self.feet.landed = self.feet.foot_of_leg[self.node.stance[-1]]
         self.observer.begin(bool(node.stance))
         self.slope.begin(self.frame.foothold(self.feet.landed))
         if not node.stance:
@@ -232,7 +232,7 @@ class EmbeddingController:
         forget_contacts(self._tick["contacts"])
         self.observer.read()
         self._decide(section)
-        self._slope_unknown = len(self.mode.stance) > 1 and self.frame.turns
+        self._slope_unknown = len(self.node.stance) > 1 and self.frame.turns
         self._publish()
 
     def tick(
@@ -322,7 +322,7 @@ class EmbeddingController:
     def _find_first_slope(self) -> None:
         """Both feet stand where a run begins: the line through them is the ground."""
         self._slope_unknown = False
-        rear, front = (self.feet.foot_of_leg[leg] for leg in self.mode.stance)
+        rear, front = (self.feet.foot_of_leg[leg] for leg in self.node.stance)
         self.slope.stand(self.frame.foothold(rear), self.frame.foothold(front))
         if self._tilt_axes(self.slope.slope, front):
             self.supervisor.follow(self.node, self.observer.now, self.time)
@@ -336,12 +336,12 @@ class EmbeddingController:
         self.feet.apply(edge.reset)
         lifted = stood - self._standing()
         # What the ground does next is not known; the best guess is its slope so far.
-        leans = bool(lifted and self.mode.stance) and self._tilt_axes(
-            self.slope.slope, self.feet.foot_of_leg[self.mode.stance[0]]
+        leans = bool(lifted and self.node.stance) and self._tilt_axes(
+            self.slope.slope, self.feet.foot_of_leg[self.node.stance[0]]
         )
         for foot in lifted:
             self._lift(foot)
-        observer, stance = self.observer, self.mode.stance
+        observer, stance = self.observer, self.node.stance
         if self.feet.landed in lifted and stance:
             # A step back: the other foot is the one on the ground.
             observer.stand_on(self.feet.foot_of_leg[stance[0]])
@@ -373,7 +373,7 @@ class EmbeddingController:
             self.lateral.lift(foot)
 
     def _standing(self) -> set[int]:
-        return {self.feet.foot_of_leg[leg] for leg in self.mode.stance}
+        return {self.feet.foot_of_leg[leg] for leg in self.node.stance}
 
     def _touch_down(self, leg: Leg) -> None:
         """The template's ground is now that of the foot which has landed.

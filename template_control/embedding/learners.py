@@ -16,7 +16,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
-from template_control.embedding.friction import set_friction
+from template_control.embedding.contacts import set_friction
 from template_control.embedding.lean import TrunkLean
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.state import EstimatorState

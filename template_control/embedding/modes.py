@@ -168,8 +168,6 @@ class Mode:
     control: PhaseControl
     tasks: TaskStack
     outgoing_edges: tuple[Edge, ...]  # to other nodes, in order
-    stance: tuple[int, ...]  # legs that carry
-    swings: tuple[int, ...]  # legs in the air that have a foothold to go to
     trimmed: bool  # the momentum trim acts somewhere in the stride
     data: Any  # of ``MODE``
 
@@ -199,17 +197,7 @@ def _mode(node: Node, automaton: Automaton, control: PhaseControl, nv: int, trim
     data["estimate_load"] = control.estimate_load and tasks.follows_com
     data["unloads"][list(control.unload_legs)] = 1
     data["unloading"] = control.unloading
-    return Mode(
-        node=node,
-        control=control,
-        tasks=tasks,
-        outgoing_edges=edges,
-        # Plain numbers: an enumeration's members are slow to index with.
-        stance=tuple(int(leg) for leg in node.stance),
-        swings=tuple(int(leg) for leg in control.swings),
-        trimmed=trimmed,
-        data=data,
-    )
+    return Mode(node, control, tasks, edges, trimmed, data)
 
 
 def check_legs(automaton: Automaton, robot: Biped) -> None:

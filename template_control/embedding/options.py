@@ -7,8 +7,7 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Annotated, Any, ClassVar
 
 from template_control.checks.ranges import Range
-from template_control.embedding.contacts import ContactOptions
-from template_control.embedding.friction import FrictionOptions
+from template_control.embedding.contacts import ContactOptions, FrictionOptions
 from template_control.embedding.lean import LeanOptions
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.phases import PHASES, PhaseControl, Phases

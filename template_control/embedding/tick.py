@@ -20,10 +20,17 @@ import numpy as np
 from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
 from template_control.embedding.com_path import KEPT, PATH, move_clock, plan_is_due, unload_cap
-from template_control.embedding.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
+from template_control.embedding.contacts import (
+    CONTACTS,
+    DUE,
+    IN_AIR,
+    ON_GROUND,
+    SLIDES,
+    feel_slides,
+    update_contacts,
+)
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
-from template_control.embedding.friction import SLIDES, feel_slides
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.lean import LEAN, advance_lean
 from template_control.embedding.learners import LOAD, observe_load

@@ -163,15 +163,7 @@ def lateral_foothold(
 
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of each foot, in the order of the robot's ``feet``."""
-_NO_AIM = LateralAim(
-    state=np.zeros(2),
-    step=0.0,
-    cost=np.zeros((2, 2)),
-    step_cost=0.0,
-    offset=np.zeros(2),
-    steps=np.zeros(2),
-    reach=0.0,
-)
+_NO_AIM = LateralAim(np.zeros(2), 0.0, np.zeros((2, 2)), 0.0, np.zeros(2), np.zeros(2), 0.0)
 """Of a robot that has walked towards no gait yet: its path comes to no foothold."""
 
 
@@ -208,7 +200,7 @@ class LateralPlanner:
         self._planar: TemplatePath | None = None
         self._path: LateralPath
         self._landed: Placement | None = None
-        self._due = np.inf
+        self.due = np.inf  # time from the section to the template's touchdown [s]; inf: in flight
         data["hold"], data["duration"] = self.options.hold, 1.0
 
     @property
@@ -233,7 +225,7 @@ class LateralPlanner:
         self._planar = None
         self.lessons.clear()
         self.data["placed"] = 0
-        self._landed, self._due = None, np.inf
+        self._landed, self.due = None, np.inf
         self.walk(gait)
 
     def walk(self, gait: Gait | None) -> None:
@@ -258,15 +250,11 @@ class LateralPlanner:
             learnt = self.learnt.after_step(stance.other, surprise, self.options.learning)
             self.lessons[self._kind] = learnt
 
-    def expect(self, due: float) -> None:
-        """Take note of the time until the template's touchdown is due [s]; inf: it is in flight."""
-        self._due = due
-
     def touch_down(self, lasted: float) -> None:
         """Learn the duration of single stance from a touchdown so long after the section [s]."""
-        if np.isfinite(self._due) and self._due > 0.0:
-            self.lessons[self._kind] = self.learnt.after_stance(lasted, self._due)
-        self._landed, self._due = self.placed, np.inf
+        if np.isfinite(self.due) and self.due > 0.0:
+            self.lessons[self._kind] = self.learnt.after_stance(lasted, self.due)
+        self._landed, self.due = self.placed, np.inf
         self.data["placed"] = 0
 
     def aim(self, stance: Side, *, turned: bool = False) -> None:

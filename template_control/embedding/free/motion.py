@@ -166,9 +166,10 @@ class LateralMotion:
         After a deviation, the ``cause`` of a new plan, the rest of a step is planned anew.
         """
         robot, data, in_air = self.robot, self.robot.data[0], None
-        if robot.patches and cause is Cause.DEVIATION and mode.control.follow_curve and mode.swings:
+        swings = mode.control.swings if mode.control.follow_curve else ()
+        if robot.patches and cause is Cause.DEVIATION and swings:
             due = supervisor.time_of(Event.TOUCHDOWN) - supervisor.phase_time
-            in_air = self._feet.foot_of_leg[mode.swings[0]], due
+            in_air = self._feet.foot_of_leg[swings[0]], due
         elif not self.planner.data[0]["leaves"]:
             return None
         x, height, speed, _ = sensed.state.tolist()
@@ -294,10 +295,10 @@ class LateralMotion:
 
         self._turn_trunk(gait.step_duration, time, 0.0 if node.stance else float(z[0]))
         if not node.stance:
-            planner.expect(inf)
+            planner.due = inf
             return node
         node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
-        planner.expect(supervisor.time_of(Event.TOUCHDOWN))
+        planner.due = supervisor.time_of(Event.TOUCHDOWN)
         return node
 
     def _wanted(self, course: Course) -> Array:
@@ -323,7 +324,7 @@ class LateralMotion:
         planner.walk(gait)
         self._turn_trunk(1.0, 0.0)
         planner.aim(self._side(self._feet.landed))
-        planner.expect(supervisor.time_of(Event.TOUCHDOWN))
+        planner.due = supervisor.time_of(Event.TOUCHDOWN)
         return node
 
     def _turn_trunk(self, duration: float, time: float, speed: float = 0.0) -> None:

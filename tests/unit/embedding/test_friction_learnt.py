@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.friction import (
+from template_control.embedding.contacts import (
     SLIDES,
     SLIDING_SPEED,
     FrictionOptions,
