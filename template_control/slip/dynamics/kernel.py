@@ -24,7 +24,7 @@ from template_control.slip.dynamics.guards import (
     first_event,
     sample,
 )
-from template_control.slip.dynamics.model import ORDER, Kernel, expand, steepest
+from template_control.slip.dynamics.model import ORDER, Kernel, backward, expand, steepest
 
 MAX_SEGMENTS = 96
 MAX_EVENTS = 16
@@ -143,7 +143,8 @@ def run_stride(
             entered = False
         row = segments if record else 0
         px, py = cx[row], cy[row]
-        horizon = expand(state, toes, stiffness, kernel, px, py, work)
+        physics = (kernel.mass, gravity, backward(kernel, stiffness), rest_length)
+        horizon = expand(state, toes, stiffness, physics, px, py, work)
         horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
         all_bends(state, toes, rest_length, steepest(px, py, horizon), horizon, bends)
         path = Path(px, py)

@@ -69,18 +69,18 @@ def expand(
     state: Array,
     toes: Array,
     stiffness: Array,
-    kernel: Kernel,
+    physics: tuple[float, float, float, float],
     cx: Array,
     cy: Array,
     work: Array,
 ) -> float:
     """Write the Taylor coefficients x(t) = sum cx[i] t^i of the CoM's path from ``state``, and y.
 
-    Returns the step [s] within which the truncated series are exact to ``TOLERANCE``; ``work`` (2,
-    4, ORDER + 1) is overwritten.
+    ``physics`` are m, gravity and :func:`backward` in this node, and l0: a call with the whole
+    kernel, 30 arguments for Numba, takes longer. Returns the step [s] within which the truncated
+    series are exact to ``TOLERANCE``; ``work`` (2, 4, ORDER + 1) is overwritten.
     """
-    mass, gravity, rest_length = kernel.mass, kernel.gravity, kernel.rest_length
-    along = backward(kernel, stiffness)
+    mass, gravity, along, rest_length = physics
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
     for n in range(ORDER - 1):
         ax = ay = 0.0

@@ -79,7 +79,7 @@ def _leg_series(
     leg: int,
     toe: float,
     stiffness: float,
-    kernel: Kernel,
+    body: tuple[float, float],
     cx: Array,
     cy: Array,
     tangents: Tangents,
@@ -87,7 +87,7 @@ def _leg_series(
     """Write a leg's G and F / m as series along a path ``cx``, ``cy``."""
     squared, cube, inverse, tilt, xx, xy = tangents.leg
     force, pull = tangents.force[leg], tangents.pull[leg]
-    rest_length, share = kernel.rest_length, stiffness / kernel.mass
+    (mass, rest_length), share = body, stiffness / body[0]
     start = cx[0]
     cx[0] = start - toe  # the series of d_x, until the end of this function
     for n in range(ORDER - 1):
@@ -108,8 +108,8 @@ def _leg_series(
         force[1, n] = -share * rest_length * xy[n]
         force[2, n] = share * (stretch - rest_length * (inverse[n] - xx[n]))
     for n in range(ORDER - 1):
-        pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / kernel.mass
-        pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / kernel.mass
+        pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / mass
+        pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / mass
     cx[0] = start
 
 
@@ -256,6 +256,7 @@ def stride_tangents(
     stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
     """
     tables, alpha, rest_length = kernel.tables, controls[0], kernel.rest_length
+    body = kernel.mass, rest_length
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
     tangents.lengths[:] = np.nan
@@ -266,9 +267,9 @@ def stride_tangents(
         step, node = meta[1], int(meta[2])
         rear, front = tables.rear[node], tables.front[node]
         if rear >= 0:
-            _leg_series(0, meta[3], meta[5], kernel, cx, cy, tangents)
+            _leg_series(0, meta[3], meta[5], body, cx, cy, tangents)
         if front >= 0:
-            _leg_series(1, meta[4], meta[6], kernel, cx, cy, tangents)
+            _leg_series(1, meta[4], meta[6], body, cx, cy, tangents)
         if rear >= 0 or front >= 0:
             _stance(rear >= 0, front >= 0, step, tangents)
         else:
