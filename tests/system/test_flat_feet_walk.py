@@ -41,7 +41,9 @@ def test_g1_stands_walks_and_stands_again():
     """In MuJoCo; ``test_one_command.py`` has the same command with a run in it, in PyBullet."""
     given = tc.Experiment.load(EXAMPLES / "zero_walk_zero.toml")
     robot = tc.robot.RobotSpec("g1", free=True)
-    record = tc.simulate(replace(given, robot=robot, world=tc.MujocoOptions()))
+    # The CoM comes to rest with a time constant of 0.4 s: stand for two seconds.
+    motion = replace(given.motion, duration=6.0)
+    record = tc.simulate(replace(given, motion=motion, robot=robot, world=tc.MujocoOptions()))
     assert record.fall_reason == ""
     assert record.solved.all()
     kinds = record.kinds_of_stride
