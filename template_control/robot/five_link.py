@@ -115,48 +115,42 @@ class FiveLink(Checked):
         A planar one has x, z and pitch, unactuated, and hinges about +y. With a ``block`` the trunk
         is the root, and either leg has three hinges.
         """
-        links, joints = [_trunk(self.trunk, self.hip_width)], []
-        if self.block is None:
+        trunk, thigh, shank, block = self.trunk, self.thigh, self.shank, self.block
+        size = f"{0.4 * trunk.length:g} {1.5 * self.hip_width:g} {trunk.length:g}"
+        box = _shape(f'box size="{size}"', 0.5 * trunk.length)
+        links, joints = [_link("trunk", _of_link(trunk, up=True), box, "grey", touches=True)], []
+        if block is None:
             held = (f'<link name="{name}">{_MASSLESS}</link>' for name in ("slide_x", "slide_z"))
             links = ['<link name="world"/>', *held, *links]
             joints = [_joint(*row, limit=(-1e3, 1e3, 0.0, 1e3)) for row in _BASE]
+        (hip, knee), speed, lateral = self.torque_limit, self.velocity_limit, "0 1 0"
+        hip_limit, knee_limit = (*self.hip_range, hip, speed), (*self.knee_range, knee, speed)
+        bend, end = f"0 0 {-thigh.length:g}", f"0 0 {-shank.length:g}"
+        foot_ball = _ball(self.foot_radius)
         for side, (colour, place) in _SIDES.items():
             parent, origin = "trunk", f"0 {place * self.hip_width:g} 0"
-            if self.block is not None:
-                name, block = f"{side}_block", self.block
+            upper, lower, foot = f"{side}_thigh", f"{side}_shank", f"{side}_foot"
+            if block is not None:
+                name, moments = f"{side}_block", (_BALL * block.mass * block.radius**2,) * 3
+                inertial = _inertial(0.0, block.mass, moments)
+                links.append(_link(name, inertial, _ball(block.radius), colour))
                 limit = (*block.range, block.torque_limit, block.velocity_limit)
-                ends = (f"{side}_abduction", "revolute", parent, name, "1 0 0")
-                links.append(_ball(name, block, colour))
-                joints.append(_joint(*ends, origin=origin, limit=limit))
+                ends = (f"{side}_abduction", "revolute", parent, name)
+                joints.append(_joint(*ends, "1 0 0", origin, limit))
                 parent, origin = name, "0 0 0"
-            links += self._leg_links(side, colour)
-            joints += self._leg_joints(side, parent, origin)
+            links += [
+                _link(upper, _of_link(thigh), _rod(thigh), colour),
+                _link(lower, _of_link(shank), _rod(shank), colour),
+                _link(foot, _MASSLESS, foot_ball, colour, touches=True),
+            ]
+            joints += [
+                _joint(f"{side}_hip", "revolute", parent, upper, lateral, origin, hip_limit),
+                _joint(f"{side}_knee", "revolute", upper, lower, lateral, bend, knee_limit),
+                _joint(f"{side}_ankle", "fixed", lower, foot, origin=end),
+            ]
         colours = (f'<material name="{n}"><color rgba="{c}"/></material>' for n, c in _COLOURS)
         robot = ('<?xml version="1.0"?>', f"<robot name={quoteattr(self.name)}>")
         return "\n".join([*robot, *colours, *links, *joints, "</robot>", ""])
-
-    def _leg_joints(self, side: str, parent: str, origin: str) -> list[str]:
-        """Hip at an ``origin`` in its parent, knee and the fixed ankle."""
-        (hip, knee), speed, axis = self.torque_limit, self.velocity_limit, "0 1 0"
-        hip_limit, knee_limit = (*self.hip_range, hip, speed), (*self.knee_range, knee, speed)
-        thigh, shank = f"{side}_thigh", f"{side}_shank"
-        bend, end = f"0 0 {-self.thigh.length:g}", f"0 0 {-self.shank.length:g}"
-        return [
-            _joint(f"{side}_hip", "revolute", parent, thigh, axis, origin=origin, limit=hip_limit),
-            _joint(f"{side}_knee", "revolute", thigh, shank, axis, origin=bend, limit=knee_limit),
-            _joint(f"{side}_ankle", "fixed", shank, f"{side}_foot", origin=end),
-        ]
-
-    def _leg_links(self, side: str, colour: str) -> list[str]:
-        """Thigh, shank and foot."""
-        sphere = f'<geometry><sphere radius="{self.foot_radius:g}"/></geometry>'
-        return [
-            _segment(f"{side}_thigh", self.thigh, colour),
-            _segment(f"{side}_shank", self.shank, colour),
-            f'<link name="{side}_foot">{_MASSLESS}\n'
-            f'  <visual>{sphere}<material name="{colour}"/></visual>\n'
-            f"  <collision>{sphere}</collision></link>",
-        ]
 
 
 # Without masses PyBullet gives a link a kilogram.
@@ -181,34 +175,26 @@ def _of_link(link: Link, up: bool = False) -> str:
     return _inertial(link.com if up else -link.com, link.mass, (x, link.inertia, z))
 
 
-def _trunk(trunk: Link, hip_width: float) -> str:
-    size = f"{0.4 * trunk.length:g} {1.5 * hip_width:g} {trunk.length:g}"
-    box = f'<geometry><box size="{size}"/></geometry>'
-    place = f'<origin xyz="0 0 {0.5 * trunk.length:g}"/>'
-    return (
-        f'<link name="trunk">{_of_link(trunk, up=True)}\n'
-        f'  <visual>{place}{box}<material name="grey"/></visual>\n'
-        f"  <collision>{place}{box}</collision></link>"
-    )
+def _shape(kind: str, height: float | None = None) -> str:
+    """A shape, with its middle at a ``height`` over its link's origin [m]."""
+    place = "" if height is None else f'<origin xyz="0 0 {height:g}"/>'
+    return f"{place}<geometry><{kind}/></geometry>"
 
 
-def _segment(name: str, link: Link, colour: str) -> str:
-    radius = 0.1 * link.length
-    return (
-        f'<link name="{name}">{_of_link(link)}\n'
-        f'  <visual><origin xyz="0 0 {-0.5 * link.length:g}"/><geometry>'
-        f'<cylinder radius="{radius:g}" length="{link.length:g}"/></geometry>'
-        f'<material name="{colour}"/></visual></link>'
-    )
+def _ball(radius: float) -> str:
+    return _shape(f'sphere radius="{radius:g}"')
 
 
-def _ball(name: str, block: HipBlock, colour: str) -> str:
-    moment = _BALL * block.mass * block.radius**2
-    ball = _inertial(0.0, block.mass, (moment, moment, moment))
-    shape = f'<geometry><sphere radius="{block.radius:g}"/></geometry>'
-    return (
-        f'<link name="{name}">{ball}\n  <visual>{shape}<material name="{colour}"/></visual></link>'
-    )
+def _rod(link: Link) -> str:
+    size = f'radius="{0.1 * link.length:g}" length="{link.length:g}"'
+    return _shape(f"cylinder {size}", -0.5 * link.length)
+
+
+def _link(name: str, inertial: str, shape: str, colour: str, touches: bool = False) -> str:
+    """A link shown as a shape, which others meet if it ``touches`` them."""
+    seen = f'\n  <visual>{shape}<material name="{colour}"/></visual>'
+    felt = f"\n  <collision>{shape}</collision>" if touches else ""
+    return f'<link name="{name}">{inertial}{seen}{felt}</link>'
 
 
 def _joint(
