@@ -3,7 +3,6 @@ from .five_link import FiveLink as FiveLink
 from .five_link import HipBlock as HipBlock
 from .five_link import Link as Link
 from .floating_biped import FloatingBaseBiped as FloatingBaseBiped
-from .floating_biped import JointLimits as JointLimits
 from .library import FLOATING_ROBOTS as FLOATING_ROBOTS
 from .library import ROBOTS as ROBOTS
 from .library import load_floating_robot as load_floating_robot
@@ -18,3 +17,4 @@ from .spec import RobotSpec as RobotSpec
 from .start import Pose as Pose
 from .start import floating_state_in as floating_state_in
 from .start import state_at_vlo as state_at_vlo
+from .urdf_edits import JointLimits as JointLimits

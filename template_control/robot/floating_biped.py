@@ -12,7 +12,6 @@ and knows nothing of the rest. The frame rests, but for :meth:`FloatingBaseBiped
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import acos, cos, isfinite, sin, sqrt
 from pathlib import Path
 from typing import NamedTuple
@@ -21,8 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from template_control.arrays import Array
-from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import Interval, Positive
+from template_control.checks.checked import checked
 from template_control.errors import ParameterError, RobotError
 from template_control.robot import urdf_edits
 from template_control.robot.biped import Biped
@@ -30,28 +28,13 @@ from template_control.robot.legs import HINGES
 from template_control.robot.requirements import add_feet, check_floating, feet_of_legs
 from template_control.robot.sole import Sole, add_soles, find_soles, mirrored, with_balls
 from template_control.robot.terms import FLOATING_DOF, MOST_SPARE, UP, gather_floating
-from template_control.robot.urdf import build_model, check_bodies, read_losses, read_urdf
+from template_control.robot.urdf import build_model, check_bodies, read_urdf
 from template_control.structured import Number, keep
 
 _UNIT = 1e-12  # of a quaternion's square: what integrating it leaves
 _ROUNDED = 1e-3  # of its length: written with few digits
 _ROOT = 1  # Pinocchio's index of the free flyer
 _PLACING = 3  # hinges that place a foot
-
-
-@dataclass(frozen=True)
-class JointLimits(Checked):
-    """Limits of all joints, in place of the URDF's.
-
-    Attributes:
-        torque: the largest [N m].
-        velocity: the largest [rad/s].
-        ranges: of a leg's joints, from the trunk to the knee [rad]; empty to keep the URDF's.
-    """
-
-    torque: Positive
-    velocity: Positive
-    ranges: tuple[Interval, ...] = ()
 
 
 class SpaceTerms(NamedTuple):
@@ -186,7 +169,7 @@ class FloatingBaseBiped(Biped):
         path: str | Path,
         feet: Sequence[str] = ("left_foot", "right_foot"),
         foot_radius: float | None = None,
-        limits: JointLimits | None = None,
+        limits: urdf_edits.JointLimits | None = None,
         walk: tuple[float, float] | None = None,
         *,
         groups: Sequence[Sequence[int]] | None = None,
@@ -228,20 +211,15 @@ class FloatingBaseBiped(Biped):
                 sole is found.
         """
         path = Path(path)
-        tree = read_urdf(path)
-        urdf_edits.drop_world(tree)
-        read_losses(path, tree, lossless)
+        tree = read_urdf(path, lossless)
         if limits is not None:
-            urdf_edits.set_limits(tree, limits.torque, limits.velocity)
-            if limits.ranges:
-                urdf_edits.set_ranges(path, tree, feet, limits.ranges)
+            urdf_edits.set_limits(path, tree, feet, limits)
         flat = flat_feet or sole is not None
         if flat and foot_radius is not None:
             raise RobotError(f"{path}: flat feet have no foot_radius: leave one of them out")
         if upper_body and not flat:
             raise RobotError(f"{path}: upper_body is of a robot on flat feet: give flat_feet too")
         if locked or flat:
-            urdf_edits.check_joint_names(path, tree, locked or ())
             others = urdf_edits.joints_in_no_leg(tree, feet) if flat else set()
             held = {
                 *(locked or {}),

@@ -12,9 +12,10 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.errors import RobotError, meant
-from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import LEGS
+from template_control.robot.urdf_edits import JointLimits
 
 AnyBiped = TypeVar("AnyBiped", PlanarBiped, FloatingBaseBiped)
 

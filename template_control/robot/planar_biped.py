@@ -31,7 +31,7 @@ from template_control.robot.requirements import (
     check_planar_legs,
 )
 from template_control.robot.terms import PLANAR_DOF, gather_planar
-from template_control.robot.urdf import build_model, check_bodies, end_of, read_losses, read_urdf
+from template_control.robot.urdf import build_model, check_bodies, end_of, named, read_urdf
 from template_control.structured import keep
 
 _PITCH = 2  # place of the trunk's pitch in q
@@ -114,9 +114,7 @@ class PlanarBiped(Biped):
                 an inertia or a size is none; if a mesh that touches the ground is missing.
         """
         path = Path(path)
-        tree = read_urdf(path)
-        urdf_edits.drop_world(tree)
-        read_losses(path, tree, lossless)
+        tree = read_urdf(path, lossless)
         if sagittal_joints:
             planarise(path, tree, feet, sagittal_joints, locked or {}, foot_radius, foot_offset)
         urdf = urdf_edits.complete(path, tree)
@@ -179,16 +177,14 @@ def planarise(
             f"{path}: sagittal_joints are {list(sagittal_joints)}: name {_SAGITTAL} different"
             " hinges in its legs: a hip and a knee each"
         )
-    joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
-    urdf_edits.check_joint_names(path, robot, (*sagittal_joints, *locked))
+    urdf_edits.lock(path, robot, sagittal_joints, locked)
+    joints = named(robot, "joint")
     for name in sagittal_joints:
         if joints[name].get("type") not in _HINGES:
             raise RobotError(
                 f"{path}: joint {name!r} is {joints[name].get('type')}: name hips and knees, which"
                 " are revolute, as sagittal_joints"
             )
-    urdf_edits.lock(path, robot, sagittal_joints, locked)
-    for name in sagittal_joints:
         if joints[name].get("type") == "continuous":
             _bound(path, joints[name])
     hips = _check_axes(path, robot, sagittal_joints)
@@ -196,7 +192,7 @@ def planarise(
     urdf_edits.take_points(path, robot)
     _shift(robot, root, hips)
     urdf_edits.spheres(path, robot, feet, foot_radius, foot_offset)
-    links = _free(_WORLD, {str(link.get("name")) for link in robot.findall("link")})
+    links = _free(_WORLD, named(robot, "link"))
     for link in links:
         ET.SubElement(robot, "link", name=link)
     names = _free([name for name, _, _ in _BASE], joints)
@@ -254,8 +250,8 @@ def _check_axes(path: Path, robot: ET.Element, sagittal: Sequence[str]) -> Array
 def _shift(robot: ET.Element, root: str, hips: Array) -> None:
     """Move the root link's frame to the height of the hips, where the pitch joint is."""
     offset = hips * [1.0, 0.0, 1.0]
-    parts = [e for link in robot.findall("link") if link.get("name") == root for e in link]
-    parts = [e for e in parts if e.tag in ("inertial", "visual", "collision")]
+    shown = ("inertial", "visual", "collision")
+    parts = [part for part in named(robot, "link")[root] if part.tag in shown]
     parts += [joint for joint in robot.findall("joint") if end_of(joint, "parent") == root]
     for part in parts:
         origin = urdf_edits.origin_of(part)

@@ -23,7 +23,7 @@ from template_control.robot.legs import (
     leg_joints,
     straight_legs,
 )
-from template_control.robot.urdf import collision_shapes
+from template_control.robot.urdf import collision_shapes, named
 from template_control.robot.urdf_edits import vector_text
 
 _LEVEL = 2e-3  # points of a foot less than this above its lowest one belong to its sole [m]
@@ -127,7 +127,7 @@ def with_balls(urdf: str, model: pin.Model, feet: Sequence[str], soles: Sequence
     robot = ET.fromstring(urdf)
     data = model.createData()
     pin.framesForwardKinematics(model, data, pin.neutral(model))
-    links = {link.get("name"): link for link in robot.findall("link")}
+    links = named(robot, "link")
     for foot, sole in zip(feet, soles, strict=True):
         link = links[foot]
         shapes = link.findall("collision")

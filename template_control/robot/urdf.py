@@ -29,24 +29,20 @@ _ABOUT_AXIS = ("revolute", "continuous", "prismatic", "planar")
 _RANGED = ("revolute", "prismatic")
 _ENDS = ("lower", "upper")
 _LIMITS = ("lower", "upper", "effort", "velocity")
-_SIZES = (
-    ("box", "size", 3),
-    ("sphere", "radius", 1),
-    ("cylinder", "radius", 1),
-    ("cylinder", "length", 1),
-    ("capsule", "radius", 1),
-    ("capsule", "length", 1),
-)
+_ROUND = {"radius": 1, "length": 1}
+_SIZES = {"box": {"size": 3}, "sphere": {"radius": 1}, "cylinder": _ROUND, "capsule": _ROUND}
 _LOSSES = ("damping", "friction")
 # Not URDF's own; written by some tools, and PyBullet has nothing that would do the same.
-_ROTORS = ("armature", "rotor_inertia", "rotorInertia")
+_ROTORS = {"armature", "rotor_inertia", "rotorInertia"}
 _ROUNDING = 1e-6  # of a link's largest moment of inertia: URDFs are written with few digits
 
 
-def read_urdf(path: Path) -> ET.Element:
+def read_urdf(path: Path, lossless: bool = False) -> ET.Element:
     """The root element of a URDF; entities of its DTD are replaced, whatever its encoding.
 
-    Axes are made as long as 1, which PyBullet takes them for; of fixed joints they are removed.
+    Axes are made as long as 1, which PyBullet takes them for; of fixed joints they are removed, and
+    a ``<dynamics>`` that states no loss, or any if the robot is to be ``lossless``. A massless root
+    link that carries nothing but a floating joint is removed: the robot floats anyway.
     """
     if not path.is_file():
         raise RobotError(f"there is no URDF at {path}: give the path of a robot's .urdf file")
@@ -65,7 +61,27 @@ def read_urdf(path: Path) -> ET.Element:
         _check_inertial(path, link)
     for joint in robot.findall("joint"):
         _check_joint(path, joint)
+    _drop_world(robot)
+    _log_rotors(path, robot)
+    for joint in robot.findall("joint"):
+        _check_losses(path, joint, lossless)
     return robot
+
+
+def named(robot: ET.Element, kind: str) -> dict[str, ET.Element]:
+    """The elements of a ``kind``, ``link`` or ``joint``, by their names."""
+    return {str(part.get("name")): part for part in robot.findall(kind)}
+
+
+def _drop_world(robot: ET.Element) -> None:
+    links, joints = named(robot, "link"), robot.findall("joint")
+    parents = [end_of(joint, "parent") for joint in joints]
+    children = {end_of(joint, "child") for joint in joints}
+    for joint, parent in zip(joints, parents, strict=True):
+        is_root = parent not in children and mass_of(links[parent]) == 0.0
+        if joint.get("type") == "floating" and parents.count(parent) == 1 and is_root:
+            robot.remove(joint)
+            robot.remove(links[parent])
 
 
 def build_model(path: Path, urdf: str) -> pin.Model:
@@ -124,40 +140,46 @@ def check_motion(path: Path, robot: ET.Element) -> None:
                 )
 
 
+def mass_of(link: ET.Element) -> float:
+    """Mass of a link [kg], 0 without ``<inertial>``."""
+    mass = link.find("inertial/mass")
+    return 0.0 if mass is None else float(mass.get("value", "0"))
+
+
+def tensor_of(link: ET.Element) -> Array:
+    """(3, 3) inertia of a link, as it states it [kg m^2]; 0 without ``<inertial>``."""
+    inertia = link.find("inertial/inertia")
+    given = {} if inertia is None else inertia.attrib
+    xx, xy, xz, yy, yz, zz = (float(given.get(name, "0")) for name in MOMENTS)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
 def link_masses(urdf: str) -> dict[str, float]:
     """Mass of each link by its name [kg], 0 without ``<inertial>``."""
-    links = ET.fromstring(urdf).findall("link")
-    masses = {str(link.get("name")): link.find("inertial/mass") for link in links}
-    return {
-        name: 0.0 if mass is None else float(mass.get("value", "0"))
-        for name, mass in masses.items()
-    }
+    return {name: mass_of(link) for name, link in named(ET.fromstring(urdf), "link").items()}
 
 
 def check_bodies(path: Path, robot: ET.Element, model: pin.Model, first: int) -> None:
     """Check that whatever a joint moves weighs something, from Pinocchio's joint ``first`` on."""
-    children = {joint.get("name"): joint.find("child") for joint in robot.findall("joint")}
+    joints = named(robot, "joint")
     for index in range(first, model.njoints):
-        child = children.get(model.names[index])
-        if model.inertias[index].mass <= 0.0 and child is not None:
+        if model.inertias[index].mass <= 0.0 and model.names[index] in joints:
             raise RobotError(
-                f"{path}: link {child.get('link')!r} weighs nothing, and so does what is fixed to"
-                " it: give it an <inertial> with its mass"
+                f"{path}: link {end_of(joints[model.names[index]], 'child')!r} weighs nothing, and"
+                " so does what is fixed to it: give it an <inertial> with its mass"
             )
 
 
 def check_shapes(path: Path, robot: ET.Element) -> None:
     """Check that shapes which touch the ground have a size."""
     for link in robot.findall("link"):
-        for geometry in link.findall("collision/geometry"):
-            for kind, name, count in _SIZES:
-                for shape in geometry.findall(kind):
-                    where = f"{path}: link {link.get('name')!r}: collision {kind}"
-                    values = _numbers(where, shape, name, count)
-                    if values.min() <= 0.0:
-                        raise RobotError(
-                            f"{where} has {name} {shape.get(name)!r}: give a positive number"
-                        )
+        for shape in link.iterfind("collision/geometry/*"):
+            for name, count in _SIZES.get(shape.tag, {}).items():
+                where = f"{path}: link {link.get('name')!r}: collision {shape.tag}"
+                if _numbers(where, shape, name, count).min() <= 0.0:
+                    raise RobotError(
+                        f"{where} has {name} {shape.get(name)!r}: give a positive number"
+                    )
 
 
 def check_inertias(path: Path, robot: ET.Element) -> None:
@@ -170,11 +192,7 @@ def check_inertias(path: Path, robot: ET.Element) -> None:
 
 def why_impossible(link: ET.Element) -> str:
     """The reason for which a link's inertia is no body's; "" if it may be."""
-    inertia = link.find("inertial/inertia")
-    if inertia is None:
-        return ""
-    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in MOMENTS)
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    moments = np.linalg.eigvalsh(tensor_of(link))
     slack = _ROUNDING * np.abs(moments).max()
     if moments[0] < -slack:
         return "its inertia has a negative principal moment: give none"
@@ -186,21 +204,17 @@ def why_impossible(link: ET.Element) -> str:
     return ""
 
 
-def read_losses(path: Path, robot: ET.Element, lossless: bool) -> None:
-    """Check the joints' ``<dynamics>``; remove it if it states no loss, or all are ``lossless``."""
-    _tell_rotors(path, robot)
-    for joint in robot.findall("joint"):
-        for dynamics in joint.findall("dynamics"):
-            given = [name for name in _LOSSES if dynamics.get(name) is not None]
-            for name in given:
-                text = str(dynamics.get(name))
-                if not 0.0 <= _number(text) < np.inf:
-                    raise RobotError(
-                        f"{path}: joint {joint.get('name')!r}: dynamics has {name} {text!r}: give a"
-                        " finite number, not below zero"
-                    )
-            if lossless or not given:
-                joint.remove(dynamics)
+def _check_losses(path: Path, joint: ET.Element, lossless: bool) -> None:
+    for dynamics in joint.findall("dynamics"):
+        given = [(name, dynamics.get(name, "0")) for name in _LOSSES if name in dynamics.attrib]
+        for name, text in given:
+            if not 0.0 <= _number(text) < np.inf:
+                raise RobotError(
+                    f"{path}: joint {joint.get('name')!r}: dynamics has {name} {text!r}: give a"
+                    " finite number, not below zero"
+                )
+        if lossless or not given:
+            joint.remove(dynamics)
 
 
 def _number(text: str) -> float:
@@ -211,12 +225,11 @@ def _number(text: str) -> float:
         return np.nan
 
 
-def _tell_rotors(path: Path, robot: ET.Element) -> None:
+def _log_rotors(path: Path, robot: ET.Element) -> None:
     """Log the first joint or transmission that has a rotor's inertia."""
     for part in (*robot.findall("joint"), *robot.findall("transmission")):
         for element in part.iter():
-            local = element.tag.rpartition("}")[2]
-            if local in _ROTORS or any(name in element.attrib for name in _ROTORS):
+            if _ROTORS & {element.tag.rpartition("}")[2], *element.attrib}:
                 text = "%s: the rotor inertia of %r is ignored, as all others: PyBullet has none"
                 warn_once(text, path, str(part.get("name")))
                 return
@@ -314,17 +327,13 @@ def _check_joint(path: Path, joint: ET.Element) -> None:
 
 def with_masses(path: Path, urdf: str, masses: Mapping[str, float]) -> str:
     """The text of a URDF with other masses by link [kg], and with inertias in proportion."""
-    before = {name: mass for name, mass in link_masses(urdf).items() if mass > 0.0}
     robot = ET.fromstring(urdf)
+    links = {name: link for name, link in named(robot, "link").items() if mass_of(link) > 0.0}
     for name, mass in masses.items():
-        if name not in before:
-            raise RobotError(
-                f"{path}: no link {name} with a mass: give some of {', '.join(before)}"
-            )
-        (link,) = (link for link in robot.findall("link") if link.get("name") == name)
-        for element, keys in (("mass", ("value",)), ("inertia", MOMENTS)):
-            found = link.find(f"inertial/{element}")
-            assert found is not None
-            for key in keys:
-                found.set(key, repr(mass / before[name] * float(found.get(key, "0"))))
+        if name not in links:
+            raise RobotError(f"{path}: no link {name} with a mass: give some of {', '.join(links)}")
+        ratio = mass / mass_of(links[name])
+        for element in links[name].iterfind("inertial/*"):
+            for key in {"mass": ("value",), "inertia": MOMENTS}.get(element.tag, ()):
+                element.set(key, repr(ratio * float(element.get(key, "0"))))
     return ET.tostring(robot, encoding="unicode")

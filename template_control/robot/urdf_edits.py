@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import xml.etree.ElementTree as ET
-from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -13,6 +13,8 @@ import numpy as np
 import pinocchio as pin
 
 from template_control.arrays import Array
+from template_control.checks.checked import Checked
+from template_control.checks.ranges import Interval, Positive
 from template_control.errors import RobotError
 from template_control.robot import urdf
 
@@ -30,14 +32,6 @@ def complete(path: Path, robot: ET.Element) -> str:
     return ET.tostring(robot, encoding="unicode")
 
 
-def check_joint_names(path: Path, robot: ET.Element, names: Iterable[str]) -> None:
-    """Check that joints are there."""
-    joints = {str(joint.get("name")) for joint in robot.findall("joint")}
-    for name in names:
-        if name not in joints:
-            raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
-
-
 def mimics(robot: ET.Element) -> dict[str, str]:
     """Names of the joints that mimic others, with those of the latter."""
     return {
@@ -53,7 +47,7 @@ def moving_joints(robot: ET.Element, locked: Collection[str]) -> set[str]:
     held = set(locked)
     for _ in leaders:  # one may mimic another that mimics
         held |= {name for name, leader in leaders.items() if leader in held}
-    return {str(joint.get("name")) for joint in robot.findall("joint")} - held
+    return urdf.named(robot, "joint").keys() - held
 
 
 def _carriers(robot: ET.Element, link: str) -> list[ET.Element]:
@@ -69,7 +63,7 @@ def _carriers(robot: ET.Element, link: str) -> list[ET.Element]:
 def joints_in_no_leg(robot: ET.Element, feet: Collection[str]) -> set[str]:
     """Names of the joints that move no foot."""
     legs = {str(joint.get("name")) for foot in feet for joint in _carriers(robot, foot)}
-    return {str(joint.get("name")) for joint in robot.findall("joint")} - legs
+    return urdf.named(robot, "joint").keys() - legs
 
 
 def lock(
@@ -79,7 +73,10 @@ def lock(
 
     A joint that mimics a locked one and is not named itself is held at its multiple.
     """
-    joints = {str(joint.get("name")): joint for joint in robot.findall("joint")}
+    joints = urdf.named(robot, "joint")
+    for name in (*moving, *locked):
+        if name not in joints:
+            raise RobotError(f"{path} has no joint {name!r}: its joints are {sorted(joints)}")
     places: dict[str, float] = dict(locked)
 
     def place(name: str) -> float:
@@ -117,29 +114,38 @@ def _fix(joint: ET.Element, position: float) -> None:
     urdf.strip_motion(joint)
 
 
-def set_limits(robot: ET.Element, torque: float, velocity: float) -> None:
-    """Give all moving joints other limits of torque [N m] and velocity [rad/s]."""
+@dataclass(frozen=True)
+class JointLimits(Checked):
+    """Limits of all joints, in place of the URDF's.
+
+    Attributes:
+        torque: the largest [N m].
+        velocity: the largest [rad/s].
+        ranges: of a leg's joints, from the trunk to the knee [rad]; empty to keep the URDF's.
+    """
+
+    torque: Positive
+    velocity: Positive
+    ranges: tuple[Interval, ...] = ()
+
+
+def set_limits(path: Path, robot: ET.Element, feet: Sequence[str], limits: JointLimits) -> None:
+    """Give all moving joints other limits of torque and velocity, and those of the legs ranges."""
     for joint in robot.findall("joint"):
         if joint.get("type") != "fixed":
             limit = joint.find("limit")
             if limit is None:
                 limit = ET.SubElement(joint, "limit", lower="-10", upper="10")
-            limit.set("effort", f"{torque:.12g}")
-            limit.set("velocity", f"{velocity:.12g}")
-
-
-def set_ranges(
-    path: Path, robot: ET.Element, feet: Sequence[str], ranges: Sequence[tuple[float, float]]
-) -> None:
-    """Give the joints of both legs other ranges [rad], from the trunk to the knee."""
-    for foot in feet:
+            limit.set("effort", f"{limits.torque:.12g}")
+            limit.set("velocity", f"{limits.velocity:.12g}")
+    for foot in feet if limits.ranges else ():
         leg = [joint for joint in _carriers(robot, foot) if joint.get("type") != "fixed"]
-        if len(leg) != len(ranges):
+        if len(leg) != len(limits.ranges):
             raise RobotError(
-                f"{path}: {len(leg)} joints move foot {foot!r}, and {len(ranges)} ranges are given:"
-                " give one for each joint of a leg"
+                f"{path}: {len(leg)} joints move foot {foot!r}, and {len(limits.ranges)} ranges are"
+                " given: give one for each joint of a leg"
             )
-        for joint, (lower, upper) in zip(reversed(leg), ranges, strict=True):
+        for joint, (lower, upper) in zip(reversed(leg), limits.ranges, strict=True):
             for limit in joint.findall("limit"):
                 limit.set("lower", f"{lower:.12g}")
                 limit.set("upper", f"{upper:.12g}")
@@ -182,23 +188,22 @@ def find_meshes(path: Path, robot: ET.Element) -> None:
     """
     missing = []
     for link in robot.findall("link"):
-        for part in ("visual", "collision"):
-            for shape in link.findall(part):
-                mesh = shape.find("geometry/mesh")
-                if mesh is None:
-                    continue
-                name = str(mesh.get("filename"))
-                file = _file(path, name)
-                if file is not None:
-                    mesh.set("filename", str(file))
-                elif part == "visual":
-                    link.remove(shape)
-                    missing.append(name)
-                else:
-                    raise RobotError(
-                        f"{path}: link {link.get('name')!r}: its collision mesh {name} is missing:"
-                        " put it there, or give the link a box, cylinder or sphere"
-                    )
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            mesh = shape.find("geometry/mesh")
+            if mesh is None:
+                continue
+            name = str(mesh.get("filename"))
+            file = _file(path, name)
+            if file is not None:
+                mesh.set("filename", str(file))
+            elif shape.tag == "visual":
+                link.remove(shape)
+                missing.append(name)
+            else:
+                raise RobotError(
+                    f"{path}: link {link.get('name')!r}: its collision mesh {name} is missing:"
+                    " put it there, or give the link a box, cylinder or sphere"
+                )
     if missing:
         urdf.warn_once(
             "%s: %d meshes are missing, the first is %s: the robot walks, and is shown with sticks",
@@ -236,19 +241,13 @@ def take_points(path: Path, robot: ET.Element) -> None:
     Heads and arms often have such an inertia, and little of the trunk's. That of a root link or of
     a leg counts, and is left for :func:`check_inertias`. All joints but the legs' are fixed.
     """
-    links = {link.get("name"): link for link in robot.findall("link")}
-    waiting, points = [root_link(robot)], []
-    while waiting:
-        name = waiting.pop()
-        for joint in robot.findall("joint"):
-            if urdf.end_of(joint, "parent") != name or joint.get("type") != "fixed":
-                continue
-            child = urdf.end_of(joint, "child")
-            waiting.append(child)
-            inertia = links[child].find("inertial/inertia")
-            if inertia is not None and urdf.why_impossible(links[child]):
+    links, points = urdf.named(robot, "link"), []
+    _, *on_trunk = _fixed_links(robot, root_link(robot))
+    for name in on_trunk:
+        if urdf.why_impossible(links[name]):
+            for inertia in links[name].iterfind("inertial/inertia"):
                 inertia.attrib.update(dict.fromkeys(urdf.MOMENTS, "0"))
-                points.append(child)
+            points.append(name)
     if points:
         text = (
             "%s: the inertia of %d links on the trunk is no body's (%s): they are taken for points"
@@ -265,51 +264,37 @@ def write_out_massless(robot: ET.Element) -> None:
             ET.SubElement(inertial, "inertia", dict.fromkeys(urdf.MOMENTS, "0"))
 
 
-def drop_world(robot: ET.Element) -> None:
-    """Remove a massless root link that carries nothing but a floating joint: it floats anyway."""
-    links = {link.get("name"): link for link in robot.findall("link")}
-    joints = robot.findall("joint")
-    children = {urdf.end_of(joint, "child") for joint in joints}
-    for joint in joints:
-        parent = urdf.end_of(joint, "parent")
-        alone = sum(urdf.end_of(other, "parent") == parent for other in joints) == 1
-        is_root = parent not in children and _inertia(links[parent]).mass == 0.0
-        if joint.get("type") == "floating" and alone and is_root:
-            robot.remove(joint)
-            robot.remove(links[parent])
-
-
 def gather_inertias(robot: ET.Element) -> None:
     """Give a massless link that moves the inertia of all links that are fixed to it.
 
     Engines take the mass of a rigid body's first link for that of the body: PyBullet holds a robot
     in the air whose root link weighs nothing, and pushes act on the first link's centre of mass.
     """
-    links = {str(link.get("name")): link for link in robot.findall("link")}
-    fixed = defaultdict(list)
-    for joint in robot.findall("joint"):
-        if joint.get("type") == "fixed":
-            fixed[urdf.end_of(joint, "parent")].append(joint)
-    first = links.keys() - {
-        urdf.end_of(joint, "child") for group in fixed.values() for joint in group
-    }
-    for name in sorted(first):
-        if _inertia(links[name]).mass > 0.0:
+    links = urdf.named(robot, "link")
+    fixed = robot.findall("joint[@type='fixed']")
+    for name in sorted(links.keys() - {urdf.end_of(joint, "child") for joint in fixed}):
+        if urdf.mass_of(links[name]) > 0.0:
             continue
-        total, found = pin.Inertia.Zero(), {name: pin.SE3.Identity()}
-        waiting = [name]
-        while waiting:
-            parent = waiting.pop()
-            for joint in fixed[parent]:
-                child = urdf.end_of(joint, "child")
-                if child in found:  # a loop: Pinocchio says so
-                    continue
-                found[child] = found[parent] * _placement(joint)
-                total += found[child].act(_inertia(links[child]))
-                waiting.append(child)
+        frames, total = _fixed_links(robot, name), pin.Inertia.Zero()
+        for other, frame in frames.items():
+            if other != name:
+                total += frame.act(_inertia(links[other]))
         if total.mass > 0.0:
-            for link in found:
+            for link in frames:
                 _set_inertia(links[link], total if link == name else None)
+
+
+def _fixed_links(robot: ET.Element, link: str) -> dict[str, pin.SE3]:
+    """Frames in that of a link, of itself and of the links that are fixed to it."""
+    found, waiting = {link: pin.SE3.Identity()}, [link]
+    while waiting:
+        parent = waiting.pop()
+        for joint in robot.findall("joint[@type='fixed']"):
+            child = urdf.end_of(joint, "child")
+            if urdf.end_of(joint, "parent") == parent and child not in found:
+                found[child] = found[parent] * _placement(joint)
+                waiting.append(child)
+    return found
 
 
 def _placement(element: ET.Element | None) -> pin.SE3:
@@ -322,12 +307,7 @@ def _placement(element: ET.Element | None) -> pin.SE3:
 
 def _inertia(link: ET.Element) -> pin.Inertia:
     """A link's inertia in its own frame."""
-    mass, inertia = link.find("inertial/mass"), link.find("inertial/inertia")
-    if mass is None or inertia is None:
-        return pin.Inertia.Zero()
-    xx, xy, xz, yy, yz, zz = (float(inertia.get(name, "0")) for name in urdf.MOMENTS)
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    own = pin.Inertia(float(mass.get("value", "0")), np.zeros(3), tensor)
+    own = pin.Inertia(urdf.mass_of(link), np.zeros(3), urdf.tensor_of(link))
     return _placement(link.find("inertial")).act(own)
 
 

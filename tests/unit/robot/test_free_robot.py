@@ -9,9 +9,10 @@ import pytest
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions, pybullet
 from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
-from template_control.robot.floating_biped import FloatingBaseBiped, JointLimits
+from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.start import Pose, floating_state_in
+from template_control.robot.urdf_edits import JointLimits
 
 
 @pytest.fixture(scope="module")
