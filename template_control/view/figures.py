@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
 
 from template_control.arrays import Array
 from template_control.checks.checked import checked
@@ -51,6 +50,9 @@ from template_control.view.style import (
     shade,
     upward,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 _LOOK = Look()
 _POSES = 0.06  # [s] from one pose of the stick diagram to the next
@@ -252,6 +254,8 @@ def lateral_portrait(record: FloatingRecord, look: Look = _LOOK) -> Figure:
 
 def pressure(record: SoleRecord, look: Look = _LOOK) -> Figure:
     """The centre of pressure in each sole, seen from above; x forward is up in the figure."""
+    from matplotlib.patches import Rectangle
+
     w = look.rows(record)
     figure, panels = panelled(6.0, 1, len(record.soles), 6.0, sharex=True, sharey=True)
     points, single = 1e3 * record.centre_of_pressure[w], record.in_phase(Phase.SS)[w]

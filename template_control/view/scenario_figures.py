@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from template_control.arrays import Array
 from template_control.checks.checked import checked
@@ -35,6 +34,10 @@ from template_control.view.style import (
     save_figure,
     shade,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _LOOK = Look()
 _WHOLE = slice(None)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from template_control.arrays import Array
 from template_control.run.record import Record
@@ -26,6 +26,10 @@ from template_control.view.style import (
     panelled,
     upward,
 )
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _LOOK = Look()
 

@@ -8,13 +8,9 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from template_control.arrays import Array
 from template_control.checks.checked import Checked
@@ -23,6 +19,12 @@ from template_control.run.record import FloatingRecord, Record
 from template_control.slip.automaton.vocabulary import Event, Phase, StrideKind
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import atomic_path
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# matplotlib is imported where a figure is made: a run without figures does not wait for it.
 
 LEFT, RIGHT, TRUNK, COM, TEMPLATE = "#2a6196", "#db7321", "#6b7078", "#3a9a4a", "#111111"
 SIDES = (LEFT, RIGHT)
@@ -45,6 +47,8 @@ FORMATS: tuple[str, ...] = get_args(Format)
 
 def figure_style() -> AbstractContextManager[None]:
     """Type and spines of all figures; letters in a PDF stay letters."""
+    import matplotlib as mpl
+
     look: dict[Any, Any] = {"font.size": 9, "pdf.fonttype": 42, "svg.fonttype": "none"}
     return mpl.rc_context({**look, "axes.spines.top": False, "axes.spines.right": False})
 
@@ -53,6 +57,8 @@ def panelled(
     height: float, rows: int = 1, columns: int = 1, width: float = 9.0, **shared: Any
 ) -> tuple[Figure, Any]:
     """A figure of a size [inch], and its panels row by row."""
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(width, height), layout="constrained")
     return figure, figure.subplots(rows, columns, squeeze=False, **shared).ravel()
 
@@ -163,7 +169,7 @@ class Look(Checked):
         return slice(first, after, 1 + (after - first) // _MOST_POINTS)
 
 
-Draw = Callable[[Any, Look], Figure]  # figure of a run, of which it shows a part
+Draw = Callable[[Any, Look], "Figure"]  # figure of a run, of which it shows a part
 
 
 def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
@@ -257,6 +263,8 @@ def mark_peaks(axes: Axes, time: Array, values: Array, color: str) -> None:
 
 def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Figure:
     """Give a figure one legend, below its panels, and its title if the look has one."""
+    from matplotlib.patches import Patch
+
     found: dict[str, Any] = {}
     for axes in panels:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):

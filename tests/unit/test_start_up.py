@@ -79,6 +79,13 @@ except SystemExit as stop:
     assert imported_by(code) == set()
 
 
+@pytest.mark.slow(seconds=4)
+def test_a_walk_without_figures_does_not_import_what_draws_them(tmp_path):
+    words = ["walk", "--steps", "1", "--no-figures", "--output", str(tmp_path)]
+    code = f"from template_control.cli.main import main\nassert main({words}) == 0"
+    assert "matplotlib" not in imported_by(code)
+
+
 def test_help_lists_every_command_with_its_line(capfd):
     with pytest.raises(SystemExit) as stop:
         main(["--help"])
