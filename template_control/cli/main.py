@@ -74,9 +74,9 @@ class _Version(argparse.Action):
 class _Parser(argparse.ArgumentParser):
     """Takes a word like ``-20@4`` for a value, as argparse does plain negative numbers only."""
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As :meth:`argparse.ArgumentParser.parse_known_args`."""
-        return super().parse_known_args(_with_values(args), namespace)
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._negative_number_matcher = re.compile(r"-[\d.]")
 
     def error(self, message: str) -> NoReturn:
         """Refuse the words in one line; those of our own types follow the option's name."""
@@ -126,17 +126,6 @@ def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
             found.add_options(sub_parser)
             sub_parser.set_defaults(run=found.run)
     return parser
-
-
-def _with_values(arguments: Sequence[str] | None) -> list[str]:
-    """The words, an option joined with a value that begins with a minus and a digit."""
-    words: list[str] = []
-    for word in sys.argv[1:] if arguments is None else arguments:
-        if words and re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z_.-]+", words[-1]):
-            words[-1] += f"={word}"
-        else:
-            words.append(word)
-    return words
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -72,6 +72,19 @@ def test_a_number_that_is_none_names_its_option(text, refused):
         assert not INTERNAL.search(line)
 
 
+@pytest.mark.parametrize(
+    ("line", "name", "value"),
+    [
+        ("walk --foot-offset -0.1 0 -2e-3", "foot_offset", [-0.1, 0.0, -2e-3]),
+        ("walk --push -20@4:0.5 --push -.5@2", "push", ["-20@4:0.5", "-.5@2"]),
+        ("gaits --limits -1 -0.5", "limits", [-1.0, -0.5]),
+        ("walk --course.side_speed -0.1", "keys", {"course.side_speed": -0.1}),
+    ],
+)
+def test_a_value_may_begin_with_a_minus(line, name, value, understood):
+    assert getattr(understood(f"template-control {line}"), name) == value
+
+
 def test_an_empty_path_is_refused_by_every_command(refused):
     assert len(PATHS) > 10
     for command, flag in PATHS:
