@@ -12,9 +12,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from template_control import settings
 from template_control.checks import option_types as values
-from template_control.cli.flags import ALL, GAIT, OWN_URDF, PLANNERS, STANDS, Flag
+from template_control.cli.flags import ALL, GAIT, LEAVES, OWN_URDF, PLANNERS, STANDS, Flag
 from template_control.embedding.free.options import KINDS
 from template_control.embedding.planners.ahead import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
@@ -44,10 +43,10 @@ def add_flags(parser: argparse.ArgumentParser, flags: Sequence[Flag]) -> None:
     parser.add_argument_group(
         "all keys", "every key of an experiment's file is an option: template-control keys"
     )
-    for key in settings.leaves(Experiment):
-        if "." in key.path:
+    for key in LEAVES:
+        if "." in key:
             parser.add_argument(
-                f"--{key.path}", dest="keys", action=_Key, help=argparse.SUPPRESS, metavar="VALUE"
+                f"--{key}", dest="keys", action=_Key, help=argparse.SUPPRESS, metavar="VALUE"
             )
 
 

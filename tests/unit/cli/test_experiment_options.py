@@ -61,6 +61,12 @@ def test_every_option_of_a_run_is_a_short_name_of_keys_of_its_file(command):
     assert long == {f"--{path}" for path in LEAVES if "." in path}
 
 
+def test_the_help_of_an_option_is_plain_text():
+    for action in options_of("walk"):
+        assert action.help, action.dest
+        assert not any(mark in action.help for mark in ("`", "None")), action.help
+
+
 def written_and_read(experiment, tmp_path):
     path = experiment.save(tmp_path / "run.toml")
     again = tc.Experiment.load(path)
