@@ -4,7 +4,33 @@ from __future__ import annotations
 
 import argparse
 
+import numpy as np
+
+from template_control.embedding.planners.ahead import AHEAD
+from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planners.walk_kernels import WALK
+from template_control.embedding.robot_template import paper_gait, template_for
+from template_control.embedding.standing.curves import STAND
+from template_control.estimation.delay import DELAY
+from template_control.plant.bullet import READ
+from template_control.plant.ideal import IdealOptions
+from template_control.robot.library import load_robot
+from template_control.robot.spec import RobotSpec
+from template_control.run.experiment import Experiment
+from template_control.run.recorder import RECORD
+from template_control.run.simulation import simulate
+from template_control.slip.automaton.vocabulary import MapKind
+from template_control.slip.control.controllers import ModifiedWalking
+from template_control.slip.dynamics.stride import controls
+from template_control.slip.gaits.basin import steps_to_fall
+from template_control.slip.gaits.gait import gait_at
+from template_control.slip.lateral.placing import LATERAL
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.scenario.run import simulate_scenario
+from template_control.slip.scenario.scenario import example_one
 from template_control.terminal import plain_console
+from template_control.warm_up import Part, ready
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -17,15 +43,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Compile what is not yet; returns 0."""
+    # Not above: what a module with that import imports is taken for part of the compiled code.
     from template_control.compiled import cache_folder
-    from template_control.embedding.planners.ahead import AHEAD
-    from template_control.embedding.planners.walk_kernels import WALK
-    from template_control.embedding.standing.curves import STAND
-    from template_control.estimation.delay import DELAY
-    from template_control.plant.bullet import READ
-    from template_control.run.recorder import RECORD
-    from template_control.slip.lateral.placing import LATERAL
-    from template_control.warm_up import Part, ready
 
     other = (Part(scenarios, 6.0), Part(basins, 1.5))
     ready((*WALK, *RECORD, *DELAY, *AHEAD, *STAND, *LATERAL, *READ, *other))
@@ -36,14 +55,6 @@ def run(options: argparse.Namespace) -> int:
 
 def scenarios() -> None:
     """All maps, and the paper's controllers on them: Example I, and a step without a guess."""
-    from template_control.slip.automaton.vocabulary import MapKind
-    from template_control.slip.control.controllers import ModifiedWalking
-    from template_control.slip.dynamics.stride import controls
-    from template_control.slip.maps.return_map import ReturnMap
-    from template_control.slip.parameters import SlipParameters
-    from template_control.slip.scenario.run import simulate_scenario
-    from template_control.slip.scenario.scenario import example_one
-
     for kind in MapKind:
         simulate_scenario(example_one(kind))
         z, u = (1.1, 0.98, 0.0), controls(1.15, 16e3, 16e3)
@@ -53,12 +64,6 @@ def scenarios() -> None:
 
 def basins() -> None:
     """Steps to fall of the default gait."""
-    import numpy as np
-
-    from template_control.slip.gaits.basin import steps_to_fall
-    from template_control.slip.gaits.gait import gait_at
-    from template_control.slip.parameters import SlipParameters
-
     template = SlipParameters()
     gait = gait_at(template, 1.152, 1.1)
     steps_to_fall(template, gait.vlo[None], gait.controls, np.zeros(2), limit=1)
@@ -66,28 +71,11 @@ def basins() -> None:
 
 def floating_base() -> None:
     """A step of a robot with a floating base."""
-    from template_control.robot.spec import RobotSpec
-    from template_control.run.experiment import Experiment
-    from template_control.run.simulation import simulate
-
     simulate(Experiment(RobotSpec("five-link-3d", free=True), steps=1))
 
 
 def ideal_plant() -> None:
     """A step of the paper's gait by the paper's controller on the ideal plant."""
-    from template_control.embedding.planners.modified import ModifiedPlanner
-    from template_control.embedding.robot_template import paper_gait, template_for
-    from template_control.plant.ideal import IdealOptions
-    from template_control.robot.library import load_robot
-    from template_control.run.experiment import Experiment
-    from template_control.run.simulation import simulate
-
     robot = load_robot("five-link")
-    simulate(
-        Experiment(
-            robot,
-            planner=ModifiedPlanner(paper_gait(template_for(robot))),
-            steps=1,
-            world=IdealOptions(),
-        )
-    )
+    planner = ModifiedPlanner(paper_gait(template_for(robot)))
+    simulate(Experiment(robot, planner=planner, steps=1, world=IdealOptions()))
