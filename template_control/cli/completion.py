@@ -21,9 +21,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print the script; returns 0."""
-    from template_control.cli.main import all_actions, full_parser
+    from template_control.cli.main import all_actions, build_parser
 
-    parser = full_parser()
+    parser = build_parser()
     for action in all_actions(parser):
         if action.help == argparse.SUPPRESS:
             action.help = ""  # a key, which no help lists and which is completed all the same

@@ -9,7 +9,7 @@ import logging
 import os
 import re
 import sys
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from typing import Any, NoReturn
 
@@ -98,19 +98,13 @@ def all_actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
                 yield from all_actions(command)
 
 
-def build_parser(arguments: Sequence[str]) -> argparse.ArgumentParser:
-    """The parser for ``arguments``, with the options of the one command that they name."""
+def build_parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """The parser for ``arguments``, with the options of the one command that they name.
+
+    None is for the options of all commands.
+    """
     # Before the command there are only options without a value.
-    wanted = next((word for word in arguments if not word.startswith("-")), None)
-    return _parser({wanted})
-
-
-def full_parser() -> argparse.ArgumentParser:
-    """The parser of all commands, with all their options."""
-    return _parser(set(_COMMANDS))
-
-
-def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
+    named = [word for word in arguments or () if not word.startswith("-")][:1]
     parser = _Parser(
         prog="template-control",
         description="Bipedal SLIP templates, their control, and robots that follow them.",
@@ -119,7 +113,7 @@ def _parser(wanted: Container[str | None]) -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name, about in _COMMANDS.items():
         sub_parser = commands.add_parser(name, help=about)
-        if name in wanted:
+        if arguments is None or name in named:
             module, _, part = _PLACES.get(name, f"cli.{name}").partition(":")
             found: Any = importlib.import_module(f"template_control.{module}")
             found = getattr(found, part) if part else found
@@ -163,27 +157,21 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
     except KeyboardInterrupt as error:
         if output is not None:
             on_signals(end_quietly)
-        return _with_notice(str(error) or _NOTHING_KEPT, INTERRUPTED)
+        line, status = str(error) or _NOTHING_KEPT, INTERRUPTED
     except TemplateControlError as error:
-        return _with_notice(str(error), _USER_ERROR)
+        line, status = str(error), _USER_ERROR
     except (Exception, SystemExit):
         if stopped():  # an import that Ctrl-C ends may end with any error
-            return _with_notice(_NOTHING_KEPT, INTERRUPTED)
-        if output is None:
-            raise
-        with suppress(OSError):
-            sys.stdout.flush()
-        if output.failure is None:
-            raise
-        if isinstance(output.failure, BrokenPipeError):
-            return _PIPE_CLOSED
-        return _with_notice(
-            f"cannot write to standard output: {output.failure.strerror}", _USER_ERROR
-        )
-
-
-def _with_notice(line: str, status: int) -> int:
-    """The status, once the line is on stderr."""
+            line, status = _NOTHING_KEPT, INTERRUPTED
+        else:
+            with suppress(OSError):
+                sys.stdout.flush()
+            failure = None if output is None else output.failure
+            if failure is None:
+                raise
+            if isinstance(failure, BrokenPipeError):
+                return _PIPE_CLOSED
+            line, status = f"cannot write to standard output: {failure.strerror}", _USER_ERROR
     notice(line)
     return status
 
