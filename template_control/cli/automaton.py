@@ -15,8 +15,8 @@ from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Outcome, Reset
 from template_control.storage import Files
 from template_control.terminal import report, table
-from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits, words
-from template_control.view.style import save_figure
+from template_control.view.automaton_figure import GAIT_NAMES, automaton_figure, gaits
+from template_control.view.style import in_words, save_figure
 
 _SUFFIXES = (".png", ".svg", ".pdf")
 _COLUMNS = ("node", "phase", "rear leg", "front leg", "guard -> successor (reset)", "fails")
@@ -115,9 +115,10 @@ def _row(node: Node) -> list[str]:
 
 def _way(edge: Edge) -> str:
     """An edge, such as ``"G_t^w touchdown -> DS_sc^w (place front)"``; a failure says why."""
+    event = in_words(edge.event.name)
     if isinstance(edge.target, Outcome):
-        return f"{words(edge.event)}: {edge.target.reason}"
-    notes = [words(edge.reset)] if edge.reset is not Reset.NONE else []
+        return f"{event}: {edge.target.reason}"
+    notes = [in_words(edge.reset.name)] if edge.reset is not Reset.NONE else []
     notes += ["ends the stride"] if edge.section else []
     tail = f" ({', '.join(notes)})" if notes else ""
-    return f"{edge.guard} {words(edge.event)} -> {edge.target}{tail}".lstrip()
+    return f"{edge.guard} {event} -> {edge.target}{tail}".lstrip()

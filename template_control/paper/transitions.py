@@ -16,6 +16,7 @@ from template_control.slip.dynamics.stride import FiredEvent, Stride, controls, 
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.view.style import in_words
 
 P = SlipParameters()
 WRT_STATE = np.array([1.101, 0.9797, -0.0442])
@@ -25,14 +26,6 @@ APEX_HEIGHT = 0.98
 RWT_STATE = np.array([1.754, 0.9766])
 RWT_TARGET = np.array([1.1, 0.98, 0.0])
 RWT_CONTROLS = controls(np.radians(71.53), 66.97e3, 18.35e3)
-_EVENTS = {
-    "TOUCHDOWN": "touchdown",
-    "VIRTUAL_BOTTOM": "virtual bottom",
-    "REAR_LIFTOFF": "liftoff",
-    "BOTTOM": "bottom",
-    "APEX": "apex",
-    "VLO": "VLO",
-}
 
 
 def run_to_walk() -> dict[MapKind, StepSolution]:
@@ -135,7 +128,7 @@ def _stride(name: str, u: Array) -> Stride:
 
 
 def _name(event: FiredEvent) -> str:
-    return _EVENTS.get(event.event.name, event.event.name)
+    return in_words(event.event.name).removeprefix("rear ")
 
 
 def _compared(figure: str, words: str, published: Stride, ours: Stride, note: str) -> Reproduction:

@@ -12,7 +12,8 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch, Patch
 
 from template_control.arrays import Array
 from template_control.slip.automaton.hybrid import Automaton, Edge
-from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, StrideKind
+from template_control.slip.automaton.vocabulary import Outcome, Phase, Reset, StrideKind
+from template_control.view.style import in_words
 
 GAIT_NAMES: dict[str, str] = {
     StrideKind.WALK: "walking",
@@ -96,17 +97,12 @@ def mathtext(name: str) -> str:
 
 def edge_label(edge: Edge) -> str:
     """Guard and, on lines of their own, the section it is and the reset it brings."""
-    lines = [mathtext(edge.guard) if edge.guard else words(edge.event)]
+    lines = [mathtext(edge.guard) if edge.guard else in_words(edge.event.name)]
     if edge.section:
-        lines.append(words(edge.event))
+        lines.append(in_words(edge.event.name))
     if edge.reset is not Reset.NONE:
-        lines.append(words(edge.reset))
+        lines.append(in_words(edge.reset.name))
     return "\n".join(lines)
-
-
-def words(name: Event | Reset) -> str:
-    """An event or a reset in words: ``"rear liftoff"``, ``"place front"``, ``"VLO"``."""
-    return name.name if name is Event.VLO else name.name.lower().replace("_", " ")
 
 
 def automaton_figure(automaton: Automaton) -> Figure:
@@ -221,7 +217,7 @@ def _label(axes: Axes, edge: Edge, place: Array, text: str, side: tuple[str, str
 def _draw_legend(axes: Axes, automaton: Automaton) -> None:
     phases = dict.fromkeys(node.phase for node in automaton.nodes)
     sections = dict.fromkeys(e.event for _, _, e in successions(automaton) if e.section)
-    names = " or ".join(words(event) for event in sections)
+    names = " or ".join(in_words(event.name) for event in sections)
     handles = [
         *(Patch(facecolor=_PHASES[p][0], edgecolor=_INK, label=_PHASES[p][1]) for p in phases),
         Line2D([], [], color=_INK, linewidth=1.2, label="guard (reset of the toes)"),

@@ -196,9 +196,9 @@ def upward(record: Record) -> str:
     return "z" if isinstance(record, FloatingRecord) else "y"
 
 
-def in_words(section: str) -> str:
-    """A section's name in a figure: ``"VLO"`` or ``"apex"``."""
-    return section if section == Event.VLO.name else section.lower()
+def in_words(name: str) -> str:
+    """Name of an event or a reset in words: ``"rear liftoff"``, ``"place front"``, ``"VLO"``."""
+    return name if name == Event.VLO.name else name.lower().replace("_", " ")
 
 
 def as_text(name: str) -> str:
