@@ -27,7 +27,7 @@ from template_control.slip.maps.section import APEX, REST, VLO
 from template_control.view.browser import PORTS, show_in_browser
 from template_control.view.live.pace import Pace
 from template_control.view.live.page import Controls, Figures, Plots, Step, first_push
-from template_control.view.live.scene import LiveScene, frame_of
+from template_control.view.live.scene import LiveScene
 from template_control.view.live.server import PageServer
 from template_control.view.replay.playback import FRAME_RATES
 
@@ -146,7 +146,7 @@ class Drive:
         assert isinstance(self._robot, Biped)
         self._ranges = ranges = VelocityRange.of(self._robot)
         self._restart()
-        self._first = record = self._going.record()
+        record = self._going.record()
         ground = getattr(self._experiment.world, "ground", None) or Terrain.flat()
         self._scene = LiveScene(self._server.scene, record, ground)
         self._scene.look(self._server.initial_camera)
@@ -260,7 +260,7 @@ class Drive:
         now = self.tick.time
         push = self._push if now - self._pushed < _PUSHED else (0.0, 0.0)
         with self._server.atomic():
-            self._scene.draw(frame_of(self._first, self._scene.sides, columns), push)
+            self._scene.draw(columns, push)
         self.step = self.step.after(self.tick, columns)
         wanted = self._going.hand.velocities[-1][1]
         self._plots.add(now, (wanted, self.step.speed, *self._figures.of(columns)))

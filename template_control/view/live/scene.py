@@ -17,15 +17,15 @@ import numpy as np
 import pinocchio as pin
 from matplotlib.colors import to_rgb
 
-from template_control.arrays import Array, BoolArray, IntArray
+from template_control.arrays import Array, IntArray
 from template_control.plant.terrain import Terrain
-from template_control.robot.biped import leg_means
 from template_control.run.record import FloatingRecord, Record
-from template_control.view.replay.playback import CARRYING, force_arrows, spring
+from template_control.view.replay.playback import spring
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals
 from template_control.view.replay.scene import (
+    Space,
+    in_space,
     plates,
-    points,
     raised,
     smoothed,
     strip,
@@ -46,46 +46,6 @@ _FOOTHOLDS = 6  # of each foot
 _PLANAR_EYE, _FLOATING_EYE, _VIEW = (1.6, -9.0, 1.0), (4.5, -7.5, 2.6), 0.24
 _MIDDLE = 0.62  # of l0: height of the middle of the picture, at the least
 _SHOWN = 0.53  # of the robot's height: size of a picture that has 0.07 of it to spare
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A moment of a run; x forward or as the world's, y to the left, z up [m].
-
-    ``q`` (nq,) and ``heading`` [rad] of the robot, its ``com`` (3,) and the ``template``'s (3,);
-    ``toes`` (2, 3) of its rear and front leg, and whether these are ``loaded`` (2,). Of each
-    contact ``foot`` (n, 3), whether it ``stands`` (n,), and the ground's force on it as an
-    ``arrow`` (n, 3).
-    """
-
-    q: Array
-    heading: float
-    com: Array
-    template: Array
-    toes: Array
-    loaded: BoolArray
-    foot: Array
-    stands: BoolArray
-    arrow: Array
-
-
-def frame_of(record: Record, sides: Array, columns: Mapping[str, Any]) -> Frame:
-    """The last of some ticks; planar feet are ``sides`` (n,) to the left [m]."""
-    last = {name: values[-1:] for name, values in columns.items()}
-    com, template, toes, foot, force = (found[0] for found in points(last, sides))
-    rear, weight = int(last["rear"][0]), record.weight
-    stands = last["contact_force"][0, :, 1] > CARRYING * weight
-    return Frame(
-        q=last["q"][0],
-        heading=float(last["heading"][0]),
-        com=com,
-        template=template,
-        toes=leg_means(toes, [record.groups[leg] for leg in (rear, 1 - rear)]),
-        loaded=np.linalg.norm(last["template_force"][0], axis=1) > CARRYING * weight,
-        foot=foot,
-        stands=stands,
-        arrow=force_arrows(force, stands, weight, float(record.template.rest_length)),
-    )
 
 
 @dataclass(frozen=True)
@@ -137,8 +97,8 @@ class LiveScene:
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=False)
         model, shapes, visuals = load_visuals(record)
-        self.sides = foot_sides(model, record.feet)
-        self._scene, self._terrain = scene, ground
+        self._sides = foot_sides(model, record.feet)
+        self._scene, self._terrain, self._record = scene, ground, record
         self._model, self._data = model, model.createData()
         self._length = length = float(record.template.rest_length)
         self._floating = isinstance(record, FloatingRecord)
@@ -238,13 +198,19 @@ class LiveScene:
             marks.append(mark)
         return marks
 
-    def draw(self, frame: Frame, push: tuple[float, float] = (0.0, 0.0)) -> None:
-        """Show a moment, with a push forward and to the left [N]; only changes are sent."""
+    def draw(self, columns: Mapping[str, Any], push: tuple[float, float] = (0.0, 0.0)) -> None:
+        """Show the last of some ticks, with a push forward and to the left [N].
+
+        Only changes are sent.
+        """
+        last = {name: values[-1:] for name, values in columns.items()}
+        places = in_space(self._record, self._sides, last)
+        frame = Space._make(values[0] for values in places)
         x, y, _ = frame.com.tolist()
         level = float(smoothed(self._terrain, np.array([x]), self._length)[0])
         self._world.position = (-x, -y, -level - self._middle)
         self._renew_ground(x, y)
-        pin.forwardKinematics(self._model, self._data, frame.q)
+        pin.forwardKinematics(self._model, self._data, last["q"][0])
         for joint, node in enumerate(self.joints, start=1):
             node.put(self._data.liMi[joint])
         self._com.position, self._template.position = frame.com, frame.template
@@ -253,7 +219,7 @@ class LiveScene:
         feet = zip(self._forces, frame.foot, frame.arrow, frame.stands.tolist(), strict=True)
         for arrow, foot, force, stands in feet:
             arrow.reach(foot, force, stands)
-        self._draw_push(frame, push)
+        self._draw_push(frame.com, float(last["heading"][0]), push)
         for foot in np.flatnonzero(frame.stands & ~self._stood).tolist():
             marks, place = self._holds[foot], frame.foot[foot]
             marks.rotate(-1)  # its oldest mark goes where it has come down
@@ -276,11 +242,11 @@ class LiveScene:
                 mark.visible = False
         self._stood[:] = False
 
-    def _draw_push(self, frame: Frame, push: tuple[float, float]) -> None:
+    def _draw_push(self, com: Array, heading: float, push: tuple[float, float]) -> None:
         size = float(np.hypot(*push))
-        turn = frame.heading + atan2(push[1], push[0])
+        turn = heading + atan2(push[1], push[0])
         span = 0.5 * self._length * np.array([cos(turn), sin(turn), 0.0])
-        self._push.reach(frame.com - span, span, size > 0.0)
+        self._push.reach(com - span, span, size > 0.0)
 
     def _renew_ground(self, x: float, y: float) -> None:
         """Draw the ground around a place [m], where the one that is drawn is too far away."""

@@ -20,9 +20,9 @@ from template_control.arrays import Array
 from template_control.errors import RecordError
 from template_control.run.record import FloatingRecord, Record
 from template_control.storage import atomic_path
-from template_control.view.replay.playback import Playback, coil, pushing, spring
+from template_control.view.replay.playback import Playback, coil, spring
 from template_control.view.replay.robot_visuals import model_of
-from template_control.view.replay.scene import in_space, smoothed
+from template_control.view.replay.scene import in_space, smoothed, stood
 from template_control.view.style import COM, SIDES, TEMPLATE, TRUNK, as_text, feet_shown, legs_shown
 
 _WIDTH = 2.6  # of the picture, in rest lengths, at the least
@@ -57,12 +57,12 @@ class Stage:
     def __init__(self, playback: Playback) -> None:
         record = playback.record
         self.playback, self._space = playback, in_space(record, np.zeros(len(record.feet)))
+        self._stood = stood(record, self._space)
         self.body = _Body(record)
         self._length = length = record.template.rest_length
         flat = not isinstance(record, FloatingRecord)
         self.camera = FROM_THE_SIDE if flat else IN_SPACE
         self._below = _BELOW[0 if flat else 1]
-        self._loaded = pushing(record)
         self._spring = spring(0.03 * length)
         self.figure = Figure(figsize=(6.4, 4.4), layout="constrained")
         FigureCanvasAgg(self.figure)
@@ -146,11 +146,11 @@ class Stage:
         self._trunk.set_xy(seen(self.body.trunk()))
         for foot, leg in enumerate(self.legs):
             leg.set_data(*seen(np.vstack((self.body.leg(foot), feet[foot]))).T)
-            places, since = space.stood[foot]
+            places, since = self._stood[foot]
             self._marks[foot].set_data(*seen(places[since <= record.time[row]]).T)
         template = seen(space.template[row])
         for end, line in enumerate(self._springs):
-            pushes = self._loaded[row, end]
+            pushes = space.loaded[row, end]
             ends = (template, seen(space.toes[row, end]))
             line.set_data(*(coil(self._spring, *ends) if pushes else ([], [])))
         self._trail.set_data(*seen(space.com[rows[: frame + 1]]).T)

@@ -77,11 +77,6 @@ def stances(record: Record) -> list[list[tuple[int, int]]]:
     return found
 
 
-def pushing(record: Record) -> BoolArray:
-    """(T, 2) whether the template's rear and its front leg push."""
-    return np.asarray(np.linalg.norm(record.template_force, axis=2) > CARRYING * record.weight)
-
-
 def spring(radius: float) -> Array:
     """(N, 2) a zigzag from (0, 0) to (0, 1), ``radius`` to either side: a leg, drawn."""
     turns = np.arange(_ZIGZAGS)

@@ -8,8 +8,7 @@ looks at its origin.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import umsgpack
@@ -22,10 +21,9 @@ from template_control.arrays import Array, BoolArray, IntArray
 from template_control.plant.terrain import Terrain
 from template_control.run.record import Record
 from template_control.view.replay.playback import (
+    CARRYING,
     Playback,
-    carrying,
     force_arrows,
-    pushing,
     spring,
     stances,
 )
@@ -88,54 +86,58 @@ def smoothed(ground: Terrain, x: Array, length: float) -> Array:
 _LANDED = 0.015  # [s] after its touchdown a foot rests
 
 
-@dataclass(frozen=True)
-class Space:
+class Space(NamedTuple):
     """Places of CoM, legs and feet; x forward or as the world's, y to the left, z up [m].
 
-    ``com`` (T, 3) of the robot and of the ``template``, ``toes`` (T, 2, 3) of its rear and front
-    leg, each ``foot`` (T, n, 3) and the ground's force on it as an ``arrow`` (T, n, 3); ``stood``
-    are for each foot (n, 3) where it stood, and (n,) since when [s].
+    ``com`` (T, 3) of the robot and of the ``template``; ``toes`` (T, 2, 3) of its rear and front
+    leg, and whether these are ``loaded`` (T, 2). Of each contact ``foot`` (T, n, 3), whether it
+    ``stands`` (T, n), and the ground's force on it as an ``arrow`` (T, n, 3).
     """
 
     com: Array
     template: Array
     toes: Array
+    loaded: BoolArray
     foot: Array
+    stands: BoolArray
     arrow: Array
-    stood: list[tuple[Array, Array]]
 
 
-def in_space(record: Record, sides: Array) -> Space:
-    """A run in three directions; planar feet are ``sides`` (feet,) to the left [m]."""
-    com, template, toes, foot, force = points(vars(record), sides)
-    samples = np.arange(len(record.time))
-    of_legs = record.of_legs(toes)
-    legs = [of_legs[samples, leg] for leg in (record.rear, 1 - record.rear)]
-    stood = []
-    for i, spans in enumerate(stances(record)):
-        since = record.time[[first for first, _ in spans]]
-        rows = np.minimum(np.searchsorted(record.time, since + _LANDED), len(samples) - 1)
-        places = foot[rows, i]
-        places[:, 2] = [record.ground.height_at(x) for x in places[:, 0].tolist()]
-        stood.append((places, since))
-    length = float(record.template.rest_length)
-    arrows = force_arrows(force, carrying(record), record.weight, length)
-    return Space(com, template, np.stack(legs, axis=1), foot, arrows, stood)
+def in_space(record: Record, sides: Array, columns: Mapping[str, Any] | None = None) -> Space:
+    """A run in three directions, or some ticks of it; planar feet are ``sides`` (n,) to the left.
 
-
-def points(fields: Mapping[str, Any], sides: Array) -> tuple[Array, ...]:
-    """(T, 3) CoM and template's CoM, (T, n, 3) toes, feet, and the ground's forces on these.
-
-    ``fields`` are those of a record, by name; planar feet are ``sides`` (feet,) to the left [m].
+    ``columns`` are the fields of these ticks, by name.
     """
-    if "space_com" in fields:
-        away, heading = fields["template_com"] - fields["com"], fields["heading"]
+    of = vars(record) if columns is None else columns
+    if "space_com" in of:
+        away, heading = of["template_com"] - of["com"], of["heading"]
         ahead = np.stack((np.cos(heading), np.sin(heading)), axis=1)
-        com, foot, force = fields["space_com"], fields["space_foot"], fields["space_force"]
-        return com, com + np.column_stack((away[:, :1] * ahead, away[:, 1])), foot, foot, force
-    names = "com", "template_com", "foot", "contact_force"
-    com, template, toes, force = (raised(fields[name]) for name in names)
-    return com, template, toes, toes + sides[:, None] * np.array([0.0, 1.0, 0.0]), force
+        com, foot, force = of["space_com"], of["space_foot"], of["space_force"]
+        template, toes = com + np.column_stack((away[:, :1] * ahead, away[:, 1])), foot
+    else:
+        names = "com", "template_com", "foot", "contact_force"
+        com, template, toes, force = (raised(of[name]) for name in names)
+        foot = toes + sides[:, None] * np.array([0.0, 1.0, 0.0])
+    samples, of_legs = np.arange(len(com)), record.of_legs(toes)
+    rear = np.asarray(of["rear"], dtype=np.intp)
+    legs = np.stack([of_legs[samples, leg] for leg in (rear, 1 - rear)], axis=1)
+    weight, length = record.weight, float(record.template.rest_length)
+    stands = of["contact_force"][:, :, 1] > CARRYING * weight
+    loaded = np.linalg.norm(of["template_force"], axis=2) > CARRYING * weight
+    arrow = force_arrows(force, stands, weight, length)
+    return Space(com, template, legs, loaded, foot, stands, arrow)
+
+
+def stood(record: Record, space: Space) -> list[tuple[Array, Array]]:
+    """For each foot (n, 3) where it stood in a run, and (n,) since when [s]."""
+    found = []
+    for foot, spans in enumerate(stances(record)):
+        since = record.time[[first for first, _ in spans]]
+        rows = np.searchsorted(record.time, since + _LANDED)
+        places = space.foot[np.minimum(rows, len(record.time) - 1), foot]
+        places[:, 2] = [record.ground.height_at(x) for x in places[:, 0].tolist()]
+        found.append((places, since))
+    return found
 
 
 def raised(places: Array) -> Array:
@@ -336,7 +338,7 @@ def _trail(scene: _Scene, playback: Playback, space: Space, length: float) -> No
 
 
 def _template(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    record, rows = playback.record, playback.rows
+    rows = playback.rows
     com = space.template[rows]
     scene.add("/meshcat/template/com/dot", mg.Sphere(0.014 * length), _overlay(TEMPLATE))
     # Nearer to the camera than the robot's CoM, or it would be drawn below that.
@@ -344,31 +346,31 @@ def _template(scene: _Scene, playback: Playback, space: Space, length: float) ->
     nearer[1, 3] = -0.03 * length
     scene.place("/meshcat/template/com/dot", nearer)
     scene.animate("/meshcat/template/com", "position", "vector3", com)
-    coil, loaded = _ribbon(raised(spring(0.03 * length)), 0.01 * length), pushing(record)[rows]
+    coil = _ribbon(raised(spring(0.03 * length)), 0.01 * length)
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
         scene.add(path, coil, _overlay(TEMPLATE))
-        scene.stretch(path, com, space.toes[rows, leg] - com, loaded[:, leg])
+        scene.stretch(path, com, space.toes[rows, leg] - com, space.loaded[rows, leg])
 
 
 def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    record, rows = playback.record, playback.rows
-    on, radius = carrying(record), 0.013 * length
+    rows, radius = playback.rows, 0.013 * length
     cone = mg.Cylinder(0.15, radiusTop=0.0, radiusBottom=3.0 * radius)
     parts = ("shaft", mg.Cylinder(0.85, radius), 0.425), ("head", cone, 0.925)
-    for foot, (name, color) in enumerate(feet_shown(record)):
+    for foot, (name, color) in enumerate(feet_shown(playback.record)):
         path = f"/meshcat/ground_force/{name.removesuffix(' foot')}"
         for part, geometry, height in parts:
             upright = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, height], [0, 0, 0, 1]])
             scene.add(f"{path}/{part}", geometry, _overlay(color))
             scene.place(f"{path}/{part}", upright)
-        scene.stretch(path, space.foot[rows, foot], space.arrow[rows, foot], on[rows, foot])
+        begin, arrow = space.foot[rows, foot], space.arrow[rows, foot]
+        scene.stretch(path, begin, arrow, space.stands[rows, foot])
 
 
 def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     record, rows = playback.record, playback.rows
-    for foot, (name, color) in enumerate(feet_shown(record)):
-        places, since = space.stood[foot]
+    feet = zip(feet_shown(record), stood(record, space), strict=True)
+    for (name, color), (places, since) in feet:
         shown = since <= record.time[rows[-1]]
         if not shown.any():
             continue

@@ -14,7 +14,7 @@ from template_control.cli.main import main
 from template_control.view.replay.film import IN_SPACE, Stage
 from template_control.view.replay.playback import playback
 from template_control.view.replay.robot_visuals import load_visuals, placements
-from template_control.view.replay.scene import in_space, scene_commands, turned_to
+from template_control.view.replay.scene import in_space, scene_commands, stood, turned_to
 
 RADIUS = 0.01  # of the feet
 
@@ -58,7 +58,7 @@ def test_the_template_is_where_its_toes_are(record):
     np.testing.assert_array_equal(space.com, record.space_com)
     away = np.linalg.norm((space.template - space.com)[:, :2], axis=1)
     np.testing.assert_allclose(away, np.abs((record.template_com - record.com)[:, 0]), atol=1e-12)
-    for foot, (places, since) in enumerate(space.stood):
+    for foot, (places, since) in enumerate(stood(record, space)):
         assert len(places) == len(since) >= 2
         assert np.all(np.diff(since) > 0.0)
         for place, time in zip(places, since, strict=True):

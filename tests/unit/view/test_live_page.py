@@ -16,7 +16,7 @@ import template_control as tc
 from template_control.errors import ParameterError
 from template_control.view.live.pace import Pace
 from template_control.view.live.page import Figures, Step, first_push
-from template_control.view.live.scene import LiveScene, frame_of
+from template_control.view.live.scene import LiveScene
 from template_control.view.live.server import PageServer, is_own
 from template_control.view.replay.robot_visuals import foot_sides, load_visuals, model_of
 from template_control.view.replay.scene import in_space
@@ -80,10 +80,10 @@ def test_a_frame_is_what_a_replay_shows(floating):
         columns = run.recorder.latest(3)
         record = run.record()
     sides = foot_sides(model_of(record), record.feet)
-    frame, space = frame_of(record, sides, columns), in_space(record, sides)
-    for name in ("com", "template", "toes", "foot", "arrow"):
-        np.testing.assert_array_equal(getattr(frame, name), getattr(space, name)[-1])
-    np.testing.assert_array_equal(frame.q, record.q[-1])
+    some, whole = in_space(record, sides, columns), in_space(record, sides)
+    for of_some, of_whole in zip(some, whole, strict=True):
+        np.testing.assert_array_equal(of_some, of_whole[-3:])
+    np.testing.assert_array_equal(columns["q"], record.q[-3:])
     share, limit = np.abs(columns["torque"]).max(axis=0), record.torque_limit
     left, right, ground, template = Figures(record).of(columns)
     assert max(left, right) == pytest.approx(np.max(share / limit))
@@ -101,12 +101,11 @@ def test_joints_are_drawn_where_they_are_and_what_stands_still_is_not_sent_again
     try:
         scene = LiveScene(server.viser.scene, record, tc.Terrain.flat())
         to = [{k: v[: i + 1] for k, v in latest.items()} for i in (20, 149)]
-        at = [frame_of(record, scene.sides, columns) for columns in to]
-        for frame in at:
-            scene.draw(frame)
+        for columns in to:
+            scene.draw(columns)
         model, _, _ = load_visuals(record)
         data = model.createData()
-        pin.forwardKinematics(model, data, at[-1].q)
+        pin.forwardKinematics(model, data, to[-1]["q"][-1])
         places = {0: pin.SE3.Identity()}
         for joint, drawn in enumerate(scene.joints, start=1):
             turn = pin.Quaternion(*np.asarray(drawn.node.wxyz)).matrix()
@@ -116,8 +115,8 @@ def test_joints_are_drawn_where_they_are_and_what_stands_still_is_not_sent_again
             )
         sent = []
         server.viser.scene._websock_interface.queue_message = sent.append
-        for frame, moves in ((at[-1], False), (at[0], True)):
-            scene.draw(frame)
+        for columns, moves in ((to[-1], False), (to[0], True)):
+            scene.draw(columns)
             names = [getattr(message, "name", "") for message in sent]
             assert any(name.startswith("/world/robot/") for name in names) is moves
     finally:

@@ -12,11 +12,10 @@ from template_control.view.replay.playback import (
     carrying,
     force_arrows,
     playback,
-    pushing,
     spring,
 )
 from template_control.view.replay.robot_visuals import load_visuals, placements
-from template_control.view.replay.scene import in_space, scene_commands
+from template_control.view.replay.scene import in_space, scene_commands, stood
 
 FOOT_RADIUS = 0.01
 
@@ -122,7 +121,8 @@ def test_the_scene_moves_with_the_run(record):
     assert np.allclose(com[:, [0, 2]], record.com[rows], atol=1e-6)
     foot = found["/meshcat/robot/right_foot_0", ".position"][1].reshape(-1, 3)
     assert np.allclose(foot[:, 0], record.foot[rows, 1, 0], atol=1e-6)
-    loaded, toes = pushing(record), in_space(record, np.zeros(2)).toes[..., [0, 2]]
+    space = in_space(record, np.zeros(2))
+    loaded, toes = space.loaded, space.toes[..., [0, 2]]
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
         times, shown = found[path, ".visible"]
@@ -152,7 +152,7 @@ def test_arrows_follow_the_force_only_where_a_foot_carries(record):
 
 
 def test_footholds_are_where_feet_stood(record):
-    of_feet = enumerate(in_space(record, np.zeros(2)).stood)
+    of_feet = enumerate(stood(record, in_space(record, np.zeros(2))))
     found = [(t, i, *x) for i, feet in of_feet for x, t in zip(*feet, strict=True)]
     found.sort()
     assert [foot for _, foot, *_ in found] == [i % 2 for i in range(len(found))]
@@ -174,7 +174,7 @@ def test_foothold_plates_appear_when_their_foot_has_landed(record):
             for key, value in geometry["data"]["attributes"].items()
         }
         corners = attributes["position"].reshape(-1, 4, 3)
-        places, landed = in_space(record, np.array([0.1, -0.1])).stood[foot]
+        places, landed = stood(record, in_space(record, np.array([0.1, -0.1])))[foot]
         assert np.allclose(corners.mean(axis=1)[:, 0], places[:, 0], atol=1e-6)
         assert np.allclose(corners.mean(axis=1)[:, 1], (0.1, -0.1)[foot])  # where its leg is
         frame = attributes["lineDistance"].reshape(-1, 4)[:, 0].astype(int)
