@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property, partial
+from inspect import isbuiltin
 from pathlib import Path
 from typing import Any, ClassVar
 from xml.etree import ElementTree
@@ -71,6 +72,20 @@ def pybullet() -> Any:
     return module
 
 
+class _World:
+    """A world of PyBullet, ``id``: the engine's functions and constants as attributes."""
+
+    def __init__(self) -> None:
+        self.id = pybullet().connect(pybullet().DIRECT)
+
+    def __getattr__(self, name: str) -> Any:
+        found = getattr(pybullet(), name)
+        if isbuiltin(found):
+            found = partial(found, physicsClientId=self.id)
+        setattr(self, name, found)
+        return found
+
+
 class BulletPlant(EnginePlant):
     """A PyBullet world in DIRECT mode with its ground and one robot.
 
@@ -86,51 +101,41 @@ class BulletPlant(EnginePlant):
         joints: PyBullet's joint indices in the order of q.
     """
 
+    _held: ClassVar[bool] = True  # whether the base link is fixed to the world
+
     @checked
     def __init__(self, robot: Biped, options: PlantOptions) -> None:
         super().__init__(robot)
         self.robot, self.options = robot, options
-        p = self._engine = pybullet()
-        self.client = c = p.connect(p.DIRECT)
-        p.setGravity(0.0, 0.0, -robot.gravity, physicsClientId=c)
-        p.setTimeStep(options.time_step, physicsClientId=c)
-        self._ground = _ground_bodies(options.ground, c)
+        self._world: Any = _World()
+        self.client = self._world.id
+        self._world.setGravity(0.0, 0.0, -robot.gravity)
+        self._world.setTimeStep(options.time_step)
+        self._ground = _ground_bodies(options.ground, self._world)
         try:
-            self.body = self._load()
-            info = self._info()
+            self.body = _load_body(robot, self._world, held=self._held)
+            count = self._world.getNumJoints(self.body)
+            info = [self._world.getJointInfo(self.body, i) for i in range(count)]
             by_name = {row[1].decode(): row[0] for row in info}
             # Pinocchio sorts sibling joints by name, Bullet keeps the file's order.
             self.joints = [by_name[name] for name in robot.model.names if name in by_name]
-            self._compare_masses(info)
+            by_link = {row[12].decode(): row[0] for row in info}
+            self._compare_masses(by_link)
             check_mass_matrix(robot, "PyBullet", self._mass_matrix)
             check_damping(robot, options.time_step)
         except RobotError:
             self.close()
             raise
-        by_link = {row[12].decode(): row[0] for row in info}
         self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
-        self._trunk = self._trunk_link()
-        self._configure(len(info))
+        self._trunk = self.joints[PLANAR_DOF - 1] if self._held else _BASE
+        self._configure(range(_BASE, count))
 
-    def _load(self) -> int:
-        return _load_body(self.robot, self.client)
-
-    def _trunk_link(self) -> int:
-        """PyBullet's index of the trunk."""
-        return self.joints[PLANAR_DOF - 1]
-
-    def _info(self) -> list[tuple[Any, ...]]:
-        p, c = self._engine, self.client
-        count = p.getNumJoints(self.body, physicsClientId=c)
-        return [p.getJointInfo(self.body, i, physicsClientId=c) for i in range(count)]
-
-    def _compare_masses(self, info: list[tuple[Any, ...]]) -> None:
+    def _compare_masses(self, links: Mapping[str, int]) -> None:
         """Check that the robot weighs here what it weighs in its model."""
         masses = link_masses(self.robot.urdf)
-        for row in info:
-            link = row[12].decode()
-            mass = self._engine.getDynamicsInfo(self.body, row[0], physicsClientId=self.client)[0]
+        for link, index in links.items():
+            mass = self._world.getDynamicsInfo(self.body, index)[0]
             if abs(mass - masses[link]) > _CLOSE * self.robot.mass:
                 raise RobotError(
                     f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
@@ -146,18 +151,15 @@ class BulletPlant(EnginePlant):
 
     def _joint_space(self, q: Array) -> Array:
         """The same in PyBullet's own coordinates; ``q`` holds the joints in its own order."""
-        angles = q.tolist()
-        return np.array(
-            self._engine.calculateMassMatrix(self.body, angles, physicsClientId=self.client)
-        )
+        return np.array(self._world.calculateMassMatrix(self.body, q.tolist()))
 
-    def _configure(self, joints: int) -> None:
-        p, c, body = self._engine, self.client, self.body
+    def _configure(self, links: Iterable[int]) -> None:
+        p, body, scale = self._world, self.body, self.options.mass_scale
         damping = dict(zip(self._actuated, self.robot.joint_damping, strict=True))
         # One property a call: a combined call silently drops some of them.
         for ground in self._ground:
-            p.changeDynamics(ground, -1, restitution=0.0, physicsClientId=c)
-        for link in range(-1, joints):
+            p.changeDynamics(ground, -1, restitution=0.0)
+        for link in links:
             for name, value in (
                 ("restitution", 0.0),
                 ("linearDamping", 0.0),
@@ -165,24 +167,16 @@ class BulletPlant(EnginePlant):
                 ("jointDamping", damping.get(link, 0.0)),
                 ("maxJointVelocity", 1e4),
             ):
-                p.changeDynamics(body, link, **{name: value}, physicsClientId=c)
-            if self.options.mass_scale != 1.0:
-                dynamics = p.getDynamicsInfo(body, link, physicsClientId=c)
+                p.changeDynamics(body, link, **{name: value})
+            if scale != 1.0:
+                dynamics = p.getDynamicsInfo(body, link)
                 mass, inertia = dynamics[0], dynamics[2]
-                scale = self.options.mass_scale
-                p.changeDynamics(body, link, mass=mass * scale, physicsClientId=c)
-                p.changeDynamics(
-                    body,
-                    link,
-                    localInertiaDiagonal=[i * scale for i in inertia],
-                    physicsClientId=c,
-                )
+                p.changeDynamics(body, link, mass=mass * scale)
+                p.changeDynamics(body, link, localInertiaDiagonal=[i * scale for i in inertia])
         dry = dict(zip(self._actuated, self.robot.joint_friction, strict=True))
         for joint in self.joints:
             # A motor that holds a joint with so much torque at most is dry friction.
-            p.setJointMotorControl2(
-                body, joint, p.VELOCITY_CONTROL, force=dry.get(joint, 0.0), physicsClientId=c
-            )
+            p.setJointMotorControl2(body, joint, p.VELOCITY_CONTROL, force=dry.get(joint, 0.0))
         self.set_friction(self.options.friction)
 
     def set_friction(self, friction: float) -> None:
@@ -191,26 +185,22 @@ class BulletPlant(EnginePlant):
         Args:
             friction: Coulomb coefficient between foot and ground.
         """
-        p, c = self._engine, self.client
+        p = self._world
         # Bullet multiplies the two bodies' values.
         for ground, own in self._ground.items():
-            share = 1.0 if own is None else own / friction
-            p.changeDynamics(ground, -1, lateralFriction=share, physicsClientId=c)
-        for link in range(-1, p.getNumJoints(self.body, physicsClientId=c)):
-            p.changeDynamics(self.body, link, lateralFriction=friction, physicsClientId=c)
+            p.changeDynamics(ground, -1, lateralFriction=1.0 if own is None else own / friction)
+        for link in range(_BASE, p.getNumJoints(self.body)):
+            p.changeDynamics(self.body, link, lateralFriction=friction)
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
         self._stale = True
         for joint, position, velocity in zip(self.joints, q, v, strict=True):
-            self._engine.resetJointState(
-                self.body, joint, position, velocity, physicsClientId=self.client
-            )
+            self._world.resetJointState(self.body, joint, position, velocity)
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
-        states = self._engine.getJointStates(self.body, self.joints, physicsClientId=self.client)
-        for i, state in enumerate(states):
+        for i, state in enumerate(self._world.getJointStates(self.body, self.joints)):
             q[i] = state[0]
             v[i] = state[1]
 
@@ -221,7 +211,7 @@ class BulletPlant(EnginePlant):
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
         forces, axes = self._forces, AXES[self.robot.directions]
-        for contact in self._engine.getContactPoints(physicsClientId=self.client):
+        for contact in self._world.getContactPoints():
             sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
             foot = self._feet.get(link)
             if foot is None:
@@ -244,35 +234,21 @@ class BulletPlant(EnginePlant):
                 for i, part in enumerate(moment(contact[6], force), 3):
                     forces[foot, i] += part
 
-    def step(self, torque: Array, push: float = 0.0) -> None:
-        """See :meth:`~.plant.Plant.step`."""
-        self._advance(torque, push, 0.0)
-
-    def _advance(self, torque: Array, push: float, left: float) -> None:
-        """One physics step with a push along the world's x and y [N]."""
-        p, c = self._engine, self.client
+    def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
+        """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
+        p, body, trunk = self._world, self.body, self._trunk
         self._stale = True
         forces = np.asarray(torque).tolist()  # Python's numbers: PyBullet is slow with others
-        p.setJointMotorControlArray(
-            self.body, self._actuated, p.TORQUE_CONTROL, forces=forces, physicsClientId=c
-        )
+        p.setJointMotorControlArray(body, self._actuated, p.TORQUE_CONTROL, forces=forces)
         if push or left:
-            p.applyExternalForce(
-                self.body,
-                self._trunk,
-                [push, left, 0.0],
-                self._trunk_com(),
-                p.WORLD_FRAME,
-                physicsClientId=c,
-            )
-        p.stepSimulation(physicsClientId=c)
-
-    def _trunk_com(self) -> Any:
-        return self._engine.getLinkState(self.body, self._trunk, physicsClientId=self.client)[0]
+            of_base = p.getBasePositionAndOrientation(body)
+            com, *_ = of_base if trunk == _BASE else p.getLinkState(body, trunk)
+            p.applyExternalForce(body, trunk, [push, left, 0.0], com, p.WORLD_FRAME)
+        p.stepSimulation()
 
     def close(self) -> None:
         """Disconnect; the plant is unusable afterwards."""
-        self._engine.disconnect(self.client)
+        self._world.disconnect()
 
 
 class FloatingBaseBulletPlant(BulletPlant):
@@ -282,6 +258,8 @@ class FloatingBaseBulletPlant(BulletPlant):
     link's own frame.
     """
 
+    _held = False
+
     def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
         ready(READ)
         super().__init__(robot, options)
@@ -289,11 +267,11 @@ class FloatingBaseBulletPlant(BulletPlant):
         self._away = np.ascontiguousarray(away.rotation), np.array(away.translation)
         self._moving = np.zeros((5, 3))
 
-    def _load(self) -> int:
-        body = _load_body(self.robot, self.client, held=False)
-        found = self._engine.getDynamicsInfo(body, _BASE, physicsClientId=self.client)
-        self._inertial = _pose(found[3], found[4])
-        return body
+    @cached_property
+    def _inertial(self) -> pin.SE3:
+        """The base link's axes of inertia in its own frame."""
+        found = self._world.getDynamicsInfo(self.body, _BASE)
+        return _pose(found[3], found[4])
 
     def _mass_matrix(self, q: Array) -> Array:
         # PyBullet's base: angular velocity first, about its CoM in its axes of inertia.
@@ -304,46 +282,33 @@ class FloatingBaseBulletPlant(BulletPlant):
         turned[:FLOATING_DOF, :FLOATING_DOF] = self._inertial.toActionMatrixInverse()
         return turned.T @ found @ turned
 
-    def _trunk_link(self) -> int:
-        return _BASE
-
-    def _trunk_com(self) -> Any:
-        return self._engine.getBasePositionAndOrientation(self.body, physicsClientId=self.client)[0]
-
-    def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
-        """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
-        self._advance(torque, push, left)
-
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
-        p, c = self._engine, self.client
         super().reset(q[_POSITION:], v[FLOATING_DOF:])
         trunk = _pose(q[:3], q[3:_POSITION])
         place = trunk * self._inertial
         quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
-        p.resetBasePositionAndOrientation(
-            self.body, place.translation.tolist(), quaternion, physicsClientId=c
+        self._world.resetBasePositionAndOrientation(
+            self.body, place.translation.tolist(), quaternion
         )
         linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:FLOATING_DOF]
         linear = linear + np.cross(angular, place.translation - trunk.translation)
-        p.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=c)
+        self._world.resetBaseVelocity(self.body, linear.tolist(), angular.tolist())
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
         super().read(q[_POSITION:], v[FLOATING_DOF:])
-        p, c = self._engine, self.client
-        place = p.getBasePositionAndOrientation(self.body, physicsClientId=c)
-        velocity, moving = p.getBaseVelocity(self.body, physicsClientId=c), self._moving
+        place = self._world.getBasePositionAndOrientation(self.body)
+        velocity, moving = self._world.getBaseVelocity(self.body), self._moving
         read_trunk(place, velocity, *self._away, q, moving)
         np.matmul(moving[:3], moving[3], out=v[:3])
         np.matmul(moving[:3], moving[4], out=v[3:FLOATING_DOF])
 
 
-def _load_body(robot: Biped, client: int, held: bool = True) -> int:
+def _load_body(robot: Biped, world: Any, held: bool) -> int:
     """Body of a robot's URDF, its root link fixed to the world if ``held``; a RobotError if bad."""
-    engine = pybullet()
     # By default Bullet recomputes inertias from shapes; pictures it does not draw it need not read.
-    flags = engine.URDF_USE_INERTIA_FROM_FILE | engine.URDF_IGNORE_VISUAL_SHAPES
+    flags = world.URDF_USE_INERTIA_FROM_FILE | world.URDF_IGNORE_VISUAL_SHAPES
     tree = ElementTree.fromstring(robot.urdf)
     for link in tree.findall("link"):
         for visual in link.findall("visual"):
@@ -353,32 +318,21 @@ def _load_body(robot: Biped, client: int, held: bool = True) -> int:
         path.write_bytes(ElementTree.tostring(tree, encoding="utf-8"))
         try:
             with decimal_points():
-                body = engine.loadURDF(
-                    str(path), useFixedBase=held, flags=flags, physicsClientId=client
-                )
-        except engine.error as error:
+                return int(world.loadURDF(str(path), useFixedBase=held, flags=flags))
+        except world.error as error:
             raise RobotError(f"PyBullet does not read {robot.path} ({error}): change it") from None
-    return int(body)
 
 
-def _ground_bodies(terrain: Terrain, client: int) -> dict[int, float | None]:
+def _ground_bodies(terrain: Terrain, world: Any) -> dict[int, float | None]:
     """Make the ground's bodies; friction of each, None where it is that of the plant's options."""
-    p = pybullet()
-
-    def body(shape: int, position: tuple[float, float, float], pitch: float = 0.0) -> int:
-        turn = p.getQuaternionFromEuler((0.0, pitch, 0.0))
-        made = p.createMultiBody(
-            0, shape, basePosition=position, baseOrientation=turn, physicsClientId=client
-        )
-        return int(made)
-
     height, stand_out = pieces(terrain)
-    plane = p.createCollisionShape(p.GEOM_PLANE, physicsClientId=client)
-    found: dict[int, float | None] = {body(plane, (0.0, 0.0, height)): None}
+    plane = world.createCollisionShape(world.GEOM_PLANE)
+    found = {world.createMultiBody(0, plane, basePosition=(0.0, 0.0, height)): None}
     for piece in stand_out:
-        sides = piece.half_sides
-        box = p.createCollisionShape(p.GEOM_BOX, halfExtents=sides, physicsClientId=client)
-        found[body(box, piece.centre, piece.pitch)] = piece.friction
+        box = world.createCollisionShape(world.GEOM_BOX, halfExtents=piece.half_sides)
+        turn = world.getQuaternionFromEuler((0.0, piece.pitch, 0.0))
+        body = world.createMultiBody(0, box, basePosition=piece.centre, baseOrientation=turn)
+        found[body] = piece.friction
     return found
 
 
