@@ -13,6 +13,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
+from datetime import date, time
 from enum import Enum
 from functools import cache
 from inspect import getdoc
@@ -31,6 +32,7 @@ _hints: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
 
 T = TypeVar("T")
 
+_OF_TOML = (bool, int, float, str, list, dict, date, time)
 _KIND = "kind"
 PYTHON_ONLY = {"python_only": True}  # metadata of a field that a file leaves out
 
@@ -60,10 +62,19 @@ def read(kind: type[T], path: str | Path) -> T:
         raise ParameterError(f"{path}: {error}") from None
 
 
+class _Keys(dict[str, Any]):
+    """Table of the keys to set in ``base``, a dataclass that has the others already."""
+
+    def __init__(self, base: Any) -> None:
+        super().__init__()
+        self.base = base
+
+
 def from_table(kind: type[T], table: Any, where: str = "") -> T:
     """A dataclass from a table of :mod:`tomllib`; ``where`` is its own key for messages."""
     if not isinstance(table, dict):
         raise ParameterError(f"{where} is {table!r}: give a table")
+    base = table.base if isinstance(table, _Keys) else None
     known = {f.name: f for f in fields(kind) if f.init}  # type: ignore[arg-type]
     hints = _hints(kind)
     old_keys: Mapping[str, str] = getattr(kind, "old_keys", {})
@@ -78,9 +89,14 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         if name in values:
             raise ParameterError(f"{place} is given by two keys: give {name} only")
         usual = _usual_kind(known[name])
-        if isinstance(value, dict) and usual is not None:
+        if isinstance(value, dict) and not isinstance(value, _Keys) and usual is not None:
             value = {_KIND: usual, **value}
         values[name] = _read(hints[name], value, place)
+    if type(base) is kind:
+        return _made(lambda: replace(base, **values), kind, where)  # type: ignore[type-var]
+    if base is not None:
+        shared = [(f, getattr(base, f.name)) for f in fields(base) if f.name in known]
+        values = {f.name: value for f, value in shared if not is_default(f, value)} | values
     for name, f in known.items():
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
@@ -113,76 +129,44 @@ def changed(options: T, keys: Mapping[str, Any]) -> T:
     ``keys`` are dotted, such as ``{"world.friction": 0.5}``, with values as in TOML or as the
     fields hold them. Another ``kind`` keeps what was set and both kinds have.
     """
-    return _changed(options, [(tuple(key.split(".")), value) for key, value in keys.items()], "")
+    table: dict[str, Any] = _Keys(options)
+    for key, value in sorted(keys.items(), key=lambda item: item[0].count(".")):
+        *path, last = key.split(".")
+        inner = table
+        for depth, name in enumerate(path, 1):
+            opened = _opened(inner, name, ".".join(path[:depth]))
+            inner[name] = opened
+            inner = opened
+        inner[last] = value
+    return from_table(type(options), table)
 
 
-_Entries = list[tuple[tuple[str, ...], Any]]  # values by path
-
-
-def _changed(options: T, entries: _Entries, where: str) -> T:
-    kind = type(options)
-    known = {f.name for f in fields(kind) if f.init}  # type: ignore[arg-type]
-    hints = _hints(kind)
-    values: dict[str, Any] = {}
-    for (name, *path), value in sorted(entries, key=lambda entry: len(entry[0])):
-        if name == _KIND and hasattr(kind, _KIND):
-            continue  # its owner has looked at it
-        place = f"{where}.{name}" if where else name
-        if name not in known:
-            raise _unknown(place, name, sorted(known))
-        if not path:
-            values[name] = _value(hints[name], value, place)
-    for name in known & {path[0] for path, _ in entries if len(path) > 1}:
-        deeper = [(path[1:], value) for path, value in entries if path[0] == name and path[1:]]
-        current = values.get(name, getattr(options, name))
-        place = f"{where}.{name}" if where else name
-        values[name] = _deeper(hints[name], current, deeper, place)
-    return _made(lambda: replace(options, **values), kind, where)  # type: ignore[type-var]
-
-
-def _value(hint: Any, value: Any, where: str) -> Any:
-    """A value as TOML says it, read; any other one as it is."""
-    said = isinstance(value, bool | int | float | str | dict)
-    said |= isinstance(value, list) and not any(is_dataclass(entry) for entry in value)
-    return _read(hint, value, where) if said else value
-
-
-def _deeper(hint: Any, current: Any, entries: _Entries, where: str) -> Any:
-    """A field's value with keys of its own set."""
-    if isinstance(current, Mapping) or current is None:
-        table: dict[str, Any] = _toml_value(current or {}, where)
-        for path, value in entries:
-            inner = table
-            for name in path[:-1]:
-                inner = inner.setdefault(name, {})
-            inner[path[-1]] = value
-        return _read(hint, table, where)
-    if not is_dataclass(current):
-        raise ParameterError(f"{where} is a {type(current).__name__}: it has no keys to set")
-    kinds = _kinds(get_args(hint))
-    wanted = next((value for path, value in entries if path == (_KIND,)), None)
-    if wanted is None or not kinds or wanted == getattr(current, _KIND, None):
-        return _changed(current, entries, where)
-    if wanted not in kinds:
-        raise ParameterError(f"{where}.{_KIND} is {wanted!r}: give one of {', '.join(kinds)}")
-    made = kinds[wanted]
-    own = {f.name for f in fields(current) if not is_default(f, getattr(current, f.name))}
-    shared = own & {f.name for f in fields(made)}
-    hints = _hints(made)
-    values = {name: getattr(current, name) for name in shared} | {
-        path[0]: _value(hints[path[0]], value, f"{where}.{path[0]}")
-        for path, value in entries
-        if len(path) == 1 and path[0] in hints and path[0] != _KIND
-    }
-    return _changed(_made(lambda: made(**values), made, where), entries, where)
+def _opened(table: Mapping[str, Any], name: str, where: str) -> dict[str, Any]:
+    """What a table holds under a name, as a table in which keys can be set."""
+    base = table.base if isinstance(table, _Keys) else None
+    value: Any = table.get(name, getattr(base, name, None))
+    if isinstance(value, _Keys):
+        return value
+    if value is None or isinstance(value, Mapping):
+        opened: dict[str, Any] = _toml_value(value or {}, where)
+        return opened
+    if not is_dataclass(value):
+        raise ParameterError(f"{where} is a {type(value).__name__}: it has no keys to set")
+    return _Keys(value)
 
 
 def _read(hint: Any, value: Any, where: str) -> Any:
-    """A value of the type ``hint`` from what TOML holds."""
+    """A value of the type ``hint`` from what TOML holds; what it cannot hold stays as it is."""
     hint = unaliased(hint)
-    if hint is Any:
+    said = isinstance(value, _OF_TOML)
+    if hint is Any or not said:
         return value
     origin, arguments = get_origin(hint), get_args(hint)
+    if isinstance(value, _Keys):
+        kinds = _kinds(arguments)
+        wanted, own = value.get(_KIND), getattr(value.base, _KIND, None)
+        if wanted in (None, own) or not kinds:
+            return from_table(type(value.base), value, where)
     if origin in (Union, UnionType):
         return _read_one_of([a for a in arguments if a is not NoneType], value, where)
     if is_dataclass(hint):

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from template_control import settings
 from template_control.arrays import Array, IntArray
 from template_control.robot.biped import Biped
 
@@ -70,22 +71,12 @@ class Statistics:
     qp_failures: int
     com_error_rms: PlanarError
     com_error_max: PlanarError
-    com_error_flight_rms: PlanarError | None
+    com_error_flight_rms: PlanarError | None = None
 
     @classmethod
     def read(cls, table: Mapping[str, Any]) -> Self:
         """Statistics as a run's metadata have them, a ``table`` of plain data."""
-        kinds = (("joint_torque", JointTorque), ("joint_speed", JointSpeed))
-        joints = {
-            key: {name: kind(**row) for name, row in table[key].items()}
-            for key, kind in (*kinds, ("joint_angle", JointAngle))
-        }
-        errors = {
-            key: value and PlanarError(**value)
-            for key, value in table.items()
-            if key.startswith("com_error")
-        }
-        return cls(**{**table, **joints, **errors})
+        return settings.from_table(cls, table)
 
 
 class Counts(NamedTuple):
