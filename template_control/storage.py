@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from filelock import lock_descriptor, unlock_descriptor
@@ -119,35 +119,29 @@ def save(record: Any, path: str | Path, kind: str, quick: bool = False) -> Path:
     return Path(path)
 
 
-class Layout(NamedTuple):
-    """Layout of a record's fields in its file.
-
-    ``fields`` are by name the sizes of each field's axes, such as "T nv 2": a letter is the same
-    number in all fields, "S+1" one more than "S". A last word "<nodes" says that it holds indices
-    into ``metadata["nodes"]``, "<2" that they are below 2. ``metadata`` are types by entry.
-    """
-
-    fields: Mapping[str, str]
-    metadata: Mapping[str, tuple[type, ...]]
-
-
 def load(
     record_type: Callable[..., T],
     path: str | Path,
     kind: str,
-    layout: Layout,
+    layout: Mapping[str, str],
+    metadata: Mapping[str, tuple[type, ...]],
 ) -> T:
-    """Record that :func:`save` wrote with the same ``kind``; a RecordError says what is wrong."""
+    """Record that :func:`save` wrote with the same ``kind``; a RecordError says what is wrong.
+
+    ``layout`` has by name the sizes of each field's axes, such as "T nv 2": a letter is the same
+    number in all fields, "S+1" one more than "S". A last word "<nodes" says that it holds indices
+    into ``metadata["nodes"]``, "<2" that they are below 2. ``metadata`` are types by entry.
+    """
     try:
         values = _values(path, kind)
-        _check(values, layout)
+        _check(values, layout, metadata)
     except FileNotFoundError:
         raise RecordError(f"there is no run at {path}: give a run.npz") from None
     except _NoRecordError as error:
         raise RecordError(
             f"{path} is no recorded run ({error}): give a run.npz of this library"
         ) from None
-    return record_type(**{name: values[name] for name in (*layout.fields, "metadata")})
+    return record_type(**{name: values[name] for name in (*layout, "metadata")})
 
 
 class _NoRecordError(Exception):
@@ -184,14 +178,15 @@ def _values(path: str | Path, kind: str) -> dict[str, Any]:
     return values
 
 
-def _check(values: Mapping[str, Any], layout: Layout) -> None:
-    """Check what was read against the layout."""
+def _check(
+    values: Mapping[str, Any], layout: Mapping[str, str], kinds: Mapping[str, tuple[type, ...]]
+) -> None:
     metadata = values["metadata"]
-    for name, types in layout.metadata.items():
+    for name, types in kinds.items():
         if not isinstance(metadata.get(name), types):
             raise _NoRecordError(f"its metadata has no {name}, or another kind of it")
     sizes: dict[str, int] = {}
-    for name, text in layout.fields.items():
+    for name, text in layout.items():
         if name not in values:
             raise _NoRecordError(f"it lacks {name}")
         *axes, bound = text.split() if "<" in text else (*text.split(), "")

@@ -208,8 +208,8 @@ class Record(Facts):
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
         kind = next((k for k in _kinds(cls) if _holds(path, k)), cls)
-        sizes = {name: quantity.layout for name, quantity in quantities(kind).items()}
-        return storage.load(kind, path, kind.file_format, storage.Layout(sizes, METADATA))
+        layout = {name: quantity.layout for name, quantity in quantities(kind).items()}
+        return storage.load(kind, path, kind.file_format, layout, METADATA)
 
 
 class RunInterrupted(KeyboardInterrupt):

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from math import prod
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -167,6 +167,15 @@ def record_row() -> None:
 RECORD = (Part(record_row, 1.5),)  # compiled functions of a recorder
 
 
+class _Block(NamedTuple):
+    """What is kept of a block of ticks; ``start`` is the time of its first one [s]."""
+
+    samples: Array
+    clocks: Array
+    counts: Counts
+    start: float
+
+
 class Recorder:
     """Records a controller's run in blocks of rows, one row for each tick.
 
@@ -222,10 +231,7 @@ class Recorder:
         self._robot = robot.data, robot.joint_places, robot.heading_frame
         self._block_start = 0  # tick of the block
         # By the block's first tick: closing it once more, after an interruption, changes nothing.
-        self._kept: dict[int, Array] = {}
-        self._clocks: dict[int, Array] = {}
-        self._counted: dict[int, Counts] = {}
-        self._starts: dict[int, float] = {}  # [s]
+        self._blocks: dict[int, _Block] = {}
         self._first = self._before = self._begins = controller.time  # [s]
         self._step = 0.0  # of the last tick [s]
         self.ticks = self._forgotten = 0
@@ -295,27 +301,28 @@ class Recorder:
     def _close_block(self) -> None:
         """Count the ticks of the block, keep its samples, and begin anew."""
         first = self._block_start
-        if first == self.ticks and self._kept:
+        if first == self.ticks and self._blocks:
             return
-        block = self._block[: self.ticks - first]
-        named = self._named(block)
-        self._counted[first] = count(named, self.controller.qp.torque_limit)
-        self._kept[first] = block[-first % self.every :: self.every].copy()
-        self._clocks[first] = np.column_stack([named[name] for name in _CLOCKS])
-        self._starts[first] = float(block[0, 0]) if len(block) else self._first
+        rows = self._block[: self.ticks - first]
+        named = self._named(rows)
+        self._blocks[first] = _Block(
+            samples=rows[-first % self.every :: self.every].copy(),
+            clocks=np.column_stack([named[name] for name in _CLOCKS]),
+            counts=count(named, self.controller.qp.torque_limit),
+            start=float(rows[0, 0]) if len(rows) else self._first,
+        )
         self._block_start = self.ticks
-        self._block, self._full, self._rows = self._full, self._block, len(block)
+        self._block, self._full, self._rows = self._full, self._block, len(rows)
         if self._keep is not None:
             self._forget(self.ticks - self._keep)
 
     def _forget(self, tick: int) -> None:
         """Forget the blocks that end before a tick."""
-        for first, after in pairwise(list(self._kept)):
+        for first, after in pairwise(list(self._blocks)):
             if after > tick:
                 break
-            for parts in (self._kept, self._clocks, self._counted, self._starts):
-                del parts[first]
-            self._forgotten, self._first = after, self._starts[after]
+            del self._blocks[first]
+            self._forgotten, self._first = after, self._blocks[after].start
 
     def _named(self, rows: Array) -> dict[str, Array]:
         """Columns of some rows by their names, each in its shape."""
@@ -338,8 +345,8 @@ class Recorder:
     def statistics(self) -> Statistics:
         """Statistics over all ticks, sampled or not."""
         self._close_block()
-        limits = self.controller.qp.torque_limit
-        return statistics(list(self._counted.values()), self.controller.robot, limits)
+        counts = [block.counts for block in self._blocks.values()]
+        return statistics(counts, self.controller.robot, self.controller.qp.torque_limit)
 
     def record(
         self, fall_reason: str = "", *, interrupted: bool = False, error: str = ""
@@ -353,9 +360,9 @@ class Recorder:
         """
         self._close_block()
         kind = _kind_of(self.controller.robot)
-        table, clocks = (
-            np.concatenate(list(parts.values())) for parts in (self._kept, self._clocks)
-        )
+        blocks = self._blocks.values()
+        table = np.concatenate([block.samples for block in blocks])
+        clocks = np.concatenate([block.clocks for block in blocks])
         fields = kind.__dataclass_fields__
         data: dict[str, Any] = {
             name: values.astype(_KINDS.get(name, float))

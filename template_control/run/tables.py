@@ -27,7 +27,7 @@ _FIRST = {"T": "time", "S": "section", "ticks": "tick"}
 class Quantity(NamedTuple):
     """Axes and SI unit of a field of a record.
 
-    ``axes`` are those of :class:`~template_control.storage.Layout` with what each stands for, such
+    ``axes`` are those of :func:`~template_control.storage.load` with what each stands for, such
     as "T n:foot 2:axis"; ``unit`` is "" where there is none, or where the last dimension's labels
     have them.
     """

@@ -43,7 +43,7 @@ _METADATA: dict[str, tuple[type, ...]] = {
 class ScenarioRecord:
     """A simulated scenario; T samples, S strides, F footholds; SI units, y up.
 
-    Each field's annotation has its axes as of :class:`~template_control.storage.Layout`.
+    Each field's annotation has its axes as of :func:`~template_control.storage.load`.
 
     Attributes:
         time: (T,) [s].
@@ -144,7 +144,7 @@ class ScenarioRecord:
         """Read it; see :func:`~template_control.storage.load`."""
         hints = get_type_hints(cls, include_extras=True)
         sizes = {name: get_args(hint)[1] for name, hint in hints.items() if name != "metadata"}
-        return storage.load(cls, path, FORMAT, storage.Layout(sizes, _METADATA))
+        return storage.load(cls, path, FORMAT, sizes, _METADATA)
 
 
 _SAMPLES = 40  # a stride
