@@ -327,7 +327,8 @@ def _ground_bodies(terrain: Terrain, world: Any) -> dict[int, float | None]:
     """Make the ground's bodies; friction of each, None where it is that of the plant's options."""
     height, stand_out = pieces(terrain)
     plane = world.createCollisionShape(world.GEOM_PLANE)
-    found = {world.createMultiBody(0, plane, basePosition=(0.0, 0.0, height)): None}
+    base = world.createMultiBody(0, plane, basePosition=(0.0, 0.0, height))
+    found: dict[int, float | None] = {base: None}
     for piece in stand_out:
         box = world.createCollisionShape(world.GEOM_BOX, halfExtents=piece.half_sides)
         turn = world.getQuaternionFromEuler((0.0, piece.pitch, 0.0))

@@ -147,11 +147,11 @@ class MujocoPlant(EnginePlant):
                 force = np.concatenate((force, turning))
             self._forces[foot] += force
 
-    def step(self, torque: Array, push: float = 0.0) -> None:
-        """See :meth:`~.plant.Plant.step`."""
+    def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
+        """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
         self._stale = True
         self.data.qfrc_applied[self._actuated] = torque
-        self.data.xfrc_applied[self._trunk, 0] = push  # at the body's centre of mass
+        self.data.xfrc_applied[self._trunk, :2] = push, left  # at the body's centre of mass
         self._engine.mj_step(self.model, self.data)
 
 
@@ -161,11 +161,6 @@ class FloatingBaseMujocoPlant(MujocoPlant):
     MuJoCo has the trunk's velocity in the world and its angular velocity in the trunk's axes, and
     quaternions begin with w.
     """
-
-    def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
-        """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
-        self.data.xfrc_applied[self._trunk, 1] = left
-        super().step(torque, push)
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""

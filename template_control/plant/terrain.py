@@ -141,9 +141,7 @@ class Terrain(Checked):
         """
         xs = self._xs
         first = max(bisect_left(xs, low) - 1, 0)
-        last = min(bisect_right(xs, high) + 1, len(xs))
-        part = self.points[first:last]
-        return list(pairwise(part))
+        return list(pairwise(self.points[first : bisect_right(xs, high) + 1]))
 
     def line(self, low: float, high: float) -> list[tuple[float, float]]:
         """The ground from one place to another, as points with straight lines between them.
@@ -331,22 +329,17 @@ def _lines(terrain: Terrain) -> list[tuple[_Point, _Point, float | None]]:
     """The lines of the ground that are no walls, cut where friction changes."""
     (first, begin), (last, end) = terrain.points[0], terrain.points[-1]
     ground = ((first - _END, begin), *terrain.points, (last + _END, end))
-    cuts = [x for x, _ in terrain.friction]
+    cuts = terrain.friction
     found = []
     for (a, low), (b, high) in pairwise(ground):
         if a == b:
             continue  # a wall: the side of its neighbour
-        places = [a, *(x for x in cuts if a < x < b), b]
+        places = [a, *(x for x, _ in cuts if a < x < b), b]
         heights = [low + (high - low) * (x - a) / (b - a) for x in places]
-        ends = list(zip(places, heights, strict=True))
-        found += [(p, q, _friction(terrain, p[0])) for p, q in pairwise(ends)]
+        for begins, ends in pairwise(zip(places, heights, strict=True)):
+            friction = next((own for x, own in reversed(cuts) if x <= begins[0]), None)
+            found.append((begins, ends, friction))
     return found
-
-
-def _friction(terrain: Terrain, x: float) -> float | None:
-    """Of the ground from ``x`` on."""
-    before = [friction for place, friction in terrain.friction if place <= x]
-    return before[-1] if before else None
 
 
 KINDS: dict[str, dict[str, Any]] = {
@@ -433,12 +426,12 @@ def read_terrain(path: str | Path) -> Terrain:
         return settings.read(Terrain, path)
     try:
         text = path.read_text(encoding="utf-8-sig")
+        lines = (line.partition("#")[0].replace(",", " ").split() for line in text.splitlines())
+        rows = [tuple(map(float, line)) for line in lines if line]
     except OSError as error:
         raise ParameterError(f"cannot read {path}: {error.strerror}; give a terrain") from None
     except UnicodeDecodeError:
         raise ParameterError(f"{path} is no text: give x and height in two columns") from None
-    try:
-        rows = [tuple(map(float, line.replace(",", " ").split())) for line in _bare(text)]
     except ValueError as error:
         raise ParameterError(f"{path}: {error}: give x and height in two columns") from None
     if any(len(row) != 2 for row in rows):
@@ -447,9 +440,3 @@ def read_terrain(path: str | Path) -> Terrain:
         return Terrain(tuple((row[0], row[1]) for row in rows))
     except ParameterError as error:
         raise ParameterError(f"{path}: {error}") from None
-
-
-def _bare(text: str) -> list[str]:
-    """Those that hold something, without remarks behind a #."""
-    lines = (line.partition("#")[0].strip() for line in text.splitlines())
-    return [line for line in lines if line]
