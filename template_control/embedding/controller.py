@@ -55,6 +55,7 @@ from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.similarity import Scale, scaled
 from template_control.structured import keep
 from template_control.warm_up import ready
+from template_control.whole_body.problem import Matrices
 from template_control.whole_body.solver import Solution, WholeBodyQp
 from template_control.whole_body.task import References
 
@@ -299,7 +300,7 @@ class EmbeddingController:
         self._tick["trim"] = self.learners.trim.acceleration
         sideways = None if self.lateral is None else self.lateral.plan(self.supervisor)
         self._plan: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
-        self._room: tuple[Array, ...] | None = None  # all of ``_kept`` is to be kept anew
+        self._room: tuple[Matrices, Array] | None = None  # all of ``_kept`` is to be kept anew
 
     def _act(self, dt: float) -> Solution:
         """References, rows and torques."""

@@ -113,11 +113,7 @@ class Jacobians(NamedTuple):
         return cls(data.M, data.nle, *found)
 
 
-Sources = tuple[Any, ...]
-"""Views into Pinocchio's data, as a plain tuple for :func:`~.structured.keep`."""
-
-
-def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> Sources:
+def sources(model: pin.Model, data: Any, frames: tuple[int, ...], limits: Array) -> tuple[Any, ...]:
     """Views that :func:`gather_planar` reads in Pinocchio's data, which every update writes.
 
     The sixth are those of :func:`move_point`: place, rotation, velocity and acceleration of each

@@ -111,8 +111,10 @@ def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
 
 
 class Matrices(NamedTuple):
-    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all."""
+    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all from the third on."""
 
+    torque_limit: Array  # (nu,) of the model [N m]
+    bounds: Array  # (2, nu) least and greatest accelerations of the joints; (2, 0): none [rad/s^2]
     a_map: Array  # (nv, nu + 1) accelerations as an affine function of the torques
     f_map: Array  # (rows, nu + 1) the same of the contact forces, or wrenches of patches
     factor: Array  # (nu, nu) L in its lower triangle
@@ -124,59 +126,15 @@ class Matrices(NamedTuple):
 
 
 @compiled
-def matrices(work: Array, nv: int, nu: int, forces: int, rows: int) -> tuple[Array, ...]:
-    """:class:`Matrices`, as a plain tuple of views into one array: a call takes one in less time.
-
-    ``forces`` are the numbers of all contact forces, ``rows`` those of the constraints.
-    """
-    a = nv * (nu + 1)
-    b = a + forces * (nu + 1)
-    c = b + nu * nu
-    d = c + nu
-    e = d + rows * nu
-    return (
-        work[:a].reshape((nv, nu + 1)),
-        work[a:b].reshape((forces, nu + 1)),
-        work[b:c].reshape((nu, nu)),
-        work[c:d],
-        work[d:e].reshape((rows, nu)),
-        work[e : e + rows],
-        work[e + rows : e + 2 * rows],
-        work[e + 2 * rows : e + 2 * rows + nu],
-    )
-
-
-@compiled
-def sizes(p: Any, arrays: tuple[Any, ...], bounds: Array) -> tuple[int, int, int, int]:
-    """Arguments of :func:`matrices` after the first; arguments as for :func:`assemble`."""
-    directions, nv, nu = arrays[4].shape[1], arrays[0].shape[0], arrays[6].shape[1]
-    rows = nu + rows_per_contact(directions) * p.contacts + bounds.shape[1]
-    return nv, nu, directions * p.contacts, rows
-
-
-@compiled
-def assemble(
-    p: Any,
-    r: Any,
-    arrays: tuple[Any, ...],
-    tasks: Array,
-    torque_limit: Array,
-    bounds: Array,
-    work: Array,
-) -> int:
-    """Fill the QP's matrices, in ``work``; ``SINGULAR``, ``BOUNDED``, or ``FREE``.
+def assemble(p: Any, r: Any, arrays: tuple[Any, ...], tasks: Array, m: Matrices) -> int:
+    """Fill the QP's matrices; ``SINGULAR``, ``BOUNDED``, or ``FREE``.
 
     ``FREE`` where ``minimum`` keeps all constraints, which are then left in z. ``p`` is of
-    ``QP_DATA``, ``r`` of ``ROBOT_DATA``; ``tasks`` (t, nv + 3) a stack's table; ``bounds`` (2, nu)
-    the least and greatest accelerations of the joints [rad/s^2], (2, 0): none.
+    ``QP_DATA``, ``r`` of ``ROBOT_DATA``; ``tasks`` (t, nv + 3) a stack's table.
     """
-    nv, nu, forces, rows = sizes(p, arrays, bounds)
-    out = matrices(work, nv, nu, forces, rows)
-    a_map, f_map, factor, gradient, constraint, lower, upper, minimum = out
-    mass_matrix, nonlinear_effects, contact = arrays[0], arrays[1], arrays[4]
+    contact, nv, nu = arrays[4], m.a_map.shape[0], m.torque_limit.shape[0]
     contacts, directions = p.contacts, contact.shape[1]
     up = min(directions, UP + 1) - 1
-    per_contact, weight, friction = rows_per_contact(directions), r.mass * r.gravity, p.friction
     jacobian, bias = np.empty((directions * contacts, nv)), np.empty(directions * contacts)
     for i in range(contacts):
         point = p.contact[i]
@@ -186,83 +144,83 @@ def assemble(
                 jacobian[i * directions + d, k] = contact[point, d, k]
             sliding = p.contact_damping * r.contact_velocity[point, axis]
             bias[i * directions + d] = r.contact_bias[point, axis] + sliding
-    if not eliminate(mass_matrix, nonlinear_effects, jacobian, bias, nv - nu, a_map, f_map):
+    if not eliminate(arrays[0], arrays[1], jacobian, bias, nv - nu, m.a_map, m.f_map):
         return SINGULAR
-    factor[:], gradient[:] = 0.0, 0.0
-    row = np.empty(nu + 1)
+    m.factor[:], m.gradient[:], m.constraint[:] = 0.0, 0.0, 0.0
     for i in range(nu):
-        factor[i, i] = p.torque_cost
+        m.factor[i, i] = p.torque_cost
+        m.constraint[i, i] = 1.0
+        m.lower[i], m.upper[i] = -1.0, 1.0
+    row = np.empty(nu + 1)
+    _add_tasks(m, tasks, row)
+    _add_contacts(p, r.mass * r.gravity, m, directions, row)
+    if directions == PATCH:
+        _add_patches(p, r, m, row)
+    first = m.constraint.shape[0] - m.bounds.shape[1]
+    for i in range(m.bounds.shape[1]):
+        _constrain(m, first + i, m.a_map[nv - nu + i], 1.0, m.bounds[0, i], m.bounds[1, i])
+    if not cholesky(m.factor, nu):
+        return SINGULAR
+    return _substitute(m, row)
+
+
+@compiled
+def _add_tasks(m: Matrices, tasks: Array, row: Array) -> None:
+    """Add the costs of the tasks' rows; ``row`` (nu + 1,) is overwritten, as in what follows."""
+    nv = m.a_map.shape[0]
     for t in range(tasks.shape[0]):
         if tasks[t, nv + WEIGHT] == 0.0:
             continue
         row[:] = 0.0
         for k in range(nv):
             if tasks[t, k] != 0.0:  # a foot moves with few of the joints
-                for j in range(nu + 1):
-                    row[j] += tasks[t, k] * a_map[k, j]
-        row[nu] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
-        _add_square(row, tasks[t, nv + WEIGHT], torque_limit, factor, gradient)
-    for i in range(contacts):
+                for j in range(row.shape[0]):
+                    row[j] += tasks[t, k] * m.a_map[k, j]
+        row[-1] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
+        _add_square(m, row, tasks[t, nv + WEIGHT])
+
+
+@compiled
+def _add_contacts(p: Any, weight: float, m: Matrices, directions: int, row: Array) -> None:
+    """Add the costs of the contacts' forces, the cones of points, and the normal forces' ranges."""
+    up, rows = min(directions, UP + 1) - 1, rows_per_contact(directions)
+    for i in range(p.contacts):
+        force, top = m.f_map[directions * i :], m.torque_limit.shape[0] + rows * i
         for d in range(up + 1):
+            for j in range(row.shape[0]):
+                row[j] = force[d, j] / weight
+            row[-1] -= p.force[i, d] / weight
+            _add_square(m, row, p.force_cost)
+        for side in range(2 * up if directions < PATCH else 0):
+            sign = 1.0 - 2.0 * (side % 2)
+            for j in range(row.shape[0]):
+                row[j] = p.friction * force[up, j] + sign * force[side // 2, j]
+            _constrain(m, top + side, row, weight, 0.0, _FAR)
+        _constrain(m, top + rows - 1, force[up], weight, 0.0, p.cap[i])
+
+
+@compiled
+def _add_patches(p: Any, r: Any, m: Matrices, row: Array) -> None:
+    """Add the costs of the soles' moments about their toes, and the cones of those that stand."""
+    nu, weight = m.torque_limit.shape[0], r.mass * r.gravity
+    wrench, cone, half = np.empty((PATCH, nu + 1)), np.empty((CONE, PATCH)), np.empty(2)
+    for i in range(p.contacts):
+        patch, top = p.contact[i], nu + (CONE + 1) * i
+        _in_sole(r.contact_axes[patch], m.f_map, PATCH * i, wrench)
+        for axis in range(3):
+            side = r.sole_half[patch, 1 if axis == 0 else 0]
             for j in range(nu + 1):
-                row[j] = f_map[i * directions + d, j] / weight
-            row[nu] -= p.force[i, d] / weight
-            _add_square(row, p.force_cost, torque_limit, factor, gradient)
-    if directions == PATCH:
-        _add_moments(p, r, f_map, (row, torque_limit), factor, gradient)
-
-    constraint[:] = 0.0
-    for i in range(nu):
-        constraint[i, i] = 1.0
-        lower[i], upper[i] = -1.0, 1.0
-    if directions == PATCH:
-        _bound_patches(p, r, f_map, torque_limit, constraint, lower, upper)
-    for i in range(contacts):
-        top, normal = nu + per_contact * i, directions * i + up
-        for d in range(up if directions < PATCH else 0):
-            along = directions * i + d
-            for side in range(2):
-                sign, at = 1.0 - 2.0 * side, top + 2 * d + side
-                for j in range(nu):
-                    constraint[at, j] = (
-                        (friction * f_map[normal, j] + sign * f_map[along, j])
-                        * torque_limit[j]
-                        / weight
-                    )
-                lower[at] = -(friction * f_map[normal, nu] + sign * f_map[along, nu]) / weight
-                upper[at] = _FAR
-        at = top + per_contact - 1
-        for j in range(nu):
-            constraint[at, j] = f_map[normal, j] * torque_limit[j] / weight
-        lower[at] = -f_map[normal, nu] / weight
-        upper[at] = min(_FAR, (p.cap[i] - f_map[normal, nu]) / weight)
-    for i in range(bounds.shape[1]):
-        row_of, joint = nu + per_contact * contacts + i, nv - nu + i
-        for j in range(nu):
-            constraint[row_of, j] = a_map[joint, j] * torque_limit[j]
-        lower[row_of] = bounds[0, i] - a_map[joint, nu]
-        upper[row_of] = bounds[1, i] - a_map[joint, nu]
-
-    if not cholesky(factor, nu):
-        return SINGULAR
-    _forward(factor, gradient)
-    for i in range(nu):  # Numba compiles the copy of a whole array for seconds
-        minimum[i] = row[i] = -gradient[i]
-    _backward(factor, row[:nu])
-    if _keeps(constraint, lower, upper, row):
-        return FREE
-    for i in range(constraint.shape[0]):
-        _forward(factor, constraint[i])
-        length = 0.0
-        for j in range(nu):
-            length += constraint[i, j] * constraint[i, j]
-        scale = 1.0 / np.sqrt(max(length, 1e-300))
-        for j in range(nu):
-            constraint[i, j] *= scale
-        lower[i] *= scale
-        if upper[i] < _FAR:
-            upper[i] *= scale
-    return BOUNDED
+                row[j] = wrench[3 + axis, j] / (weight * side)
+            _add_square(m, row, p.force_cost if axis == UP else _CROOKED * p.force_cost)
+        for k in range(2):
+            half[k] = p.sole_share * r.sole_half[patch, k]
+        patch_cone(p.friction, half, r.sole_centre[patch], cone)
+        for k in range(CONE):
+            row[:] = 0.0
+            for j in range(nu + 1):
+                for d in range(PATCH):
+                    row[j] += cone[k, d] * wrench[d, j]
+            _constrain(m, top + k, row, weight, 0.0, _FAR)
 
 
 @compiled
@@ -278,53 +236,37 @@ def _in_sole(axes: Array, f_map: Array, first: int, out: Array) -> None:
 
 
 @compiled
-def _add_moments(
-    p: Any, r: Any, f_map: Array, parts: tuple[Array, Array], factor: Array, gradient: Array
-) -> None:
-    """Add the cost of the soles' moments about their toes; ``parts``: a row, torque limits."""
-    row, torque_limit = parts
-    wrench, weight = np.empty((PATCH, f_map.shape[1])), r.mass * r.gravity
-    for i in range(p.contacts):
-        patch = p.contact[i]
-        _in_sole(r.contact_axes[patch], f_map, PATCH * i, wrench)
-        for axis in range(3):
-            side = r.sole_half[patch, 1 if axis == 0 else 0]
-            for j in range(f_map.shape[1]):
-                row[j] = wrench[3 + axis, j] / (weight * side)
-            cost = p.force_cost if axis == UP else _CROOKED * p.force_cost
-            _add_square(row, cost, torque_limit, factor, gradient)
+def _constrain(m: Matrices, at: int, row: Array, unit: float, low: float, high: float) -> None:
+    """Write the constraint low <= row[:-1] tau + row[-1] <= high, over a ``unit``, in z."""
+    nu = m.torque_limit.shape[0]
+    for j in range(nu):
+        m.constraint[at, j] = row[j] * m.torque_limit[j] / unit
+    m.lower[at] = (low - row[nu]) / unit
+    m.upper[at] = _FAR if high >= _FAR else (high - row[nu]) / unit
 
 
 @compiled
-def _bound_patches(
-    p: Any,
-    r: Any,
-    f_map: Array,
-    torque_limit: Array,
-    constraint: Array,
-    lower: Array,
-    upper: Array,
-) -> None:
-    """Write the cones of the soles that stand; arguments as in :func:`assemble`."""
-    nu = torque_limit.shape[0]
-    wrench, cone, weight = np.empty((PATCH, nu + 1)), np.empty((CONE, PATCH)), r.mass * r.gravity
-    half = np.empty(2)
-    for i in range(p.contacts):
-        patch, top = p.contact[i], nu + (CONE + 1) * i
-        _in_sole(r.contact_axes[patch], f_map, PATCH * i, wrench)
-        for k in range(2):
-            half[k] = p.sole_share * r.sole_half[patch, k]
-        patch_cone(p.friction, half, r.sole_centre[patch], cone)
-        for k in range(CONE):
-            for j in range(nu):
-                total = 0.0
-                for d in range(PATCH):
-                    total += cone[k, d] * wrench[d, j]
-                constraint[top + k, j] = total * torque_limit[j] / weight
-            total = 0.0
-            for d in range(PATCH):
-                total += cone[k, d] * wrench[d, nu]
-            lower[top + k], upper[top + k] = -total / weight, _FAR
+def _substitute(m: Matrices, row: Array) -> int:
+    """Take the QP from z to w, with the factor of H, but for constraints where none acts."""
+    nu = m.torque_limit.shape[0]
+    _forward(m.factor, m.gradient)
+    for i in range(nu):  # Numba compiles the copy of a whole array for seconds
+        m.minimum[i] = row[i] = -m.gradient[i]
+    _backward(m.factor, row[:nu])
+    if _keeps(m.constraint, m.lower, m.upper, row):
+        return FREE
+    for i in range(m.constraint.shape[0]):
+        _forward(m.factor, m.constraint[i])
+        length = 0.0
+        for j in range(nu):
+            length += m.constraint[i, j] * m.constraint[i, j]
+        scale = 1.0 / np.sqrt(max(length, 1e-300))
+        for j in range(nu):
+            m.constraint[i, j] *= scale
+        m.lower[i] *= scale
+        if m.upper[i] < _FAR:
+            m.upper[i] *= scale
+    return BOUNDED
 
 
 @compiled
@@ -358,7 +300,7 @@ def _backward(factor: Array, vector: Array) -> None:
 
 
 @compiled
-def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
+def torques(m: Matrices, w: Array, out: Array) -> None:
     """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out`` (nu,) [N m].
 
     They are rounded to 2^-24 of tau_max, which is near ProxQP's tolerance. Where a process has
@@ -368,24 +310,22 @@ def torques(factor: Array, w: Array, torque_limit: Array, out: Array) -> None:
     """
     for i in range(w.shape[0]):
         out[i] = w[i]
-    _backward(factor, out)
+    _backward(m.factor, out)
     for i in range(w.shape[0]):
         # The solver's tolerance may leave a torque a hair beyond its limit.
         share = np.round(min(1.0, max(-1.0, out[i])) * _GRID) / _GRID
-        out[i] = share * torque_limit[i]
+        out[i] = share * m.torque_limit[i]
 
 
 @compiled
-def _add_square(
-    row: Array, row_weight: float, scale: Array, hessian: Array, gradient: Array
-) -> None:
-    """Add the square of (row[:-1] tau + row[-1]), tau = scale * z, to H's lower triangle and g."""
-    nu = gradient.shape[0]
+def _add_square(m: Matrices, row: Array, weight: float) -> None:
+    """Add the square of (row[:-1] tau + row[-1]), tau = tau_max z, to H's lower triangle and g."""
+    nu, scale = m.gradient.shape[0], m.torque_limit
     for i in range(nu):
-        left = row_weight * row[i] * scale[i]
-        gradient[i] += left * row[nu]
+        left = weight * row[i] * scale[i]
+        m.gradient[i] += left * row[nu]
         for j in range(i + 1):
-            hessian[i, j] += left * row[j] * scale[j]
+            m.factor[i, j] += left * row[j] * scale[j]
 
 
 @compiled
@@ -400,16 +340,14 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 
 
 @compiled
-def answer(p: Any, work: Array, model: Array, found: tuple[Array, Array, Array]) -> None:
+def answer(p: Any, m: Matrices, model: Array, found: tuple[Array, Array, Array]) -> None:
     """Write a tick's answer into ``found``: torques, forces of the contacts, accelerations.
 
-    ``model`` are the joint torques (nu,) of the model [N m], ``work`` is what :func:`assemble` has
-    filled.
+    ``model`` are the joint torques (nu,) of the model [N m].
     """
     torque, force, acceleration = found
-    out = matrices(work, acceleration.shape[0], torque.shape[0], force.shape[0], 0)
-    _affine(out[0], model, acceleration)
-    _affine(out[1], model, force)
+    _affine(m.a_map, model, acceleration)
+    _affine(m.f_map, model, force)
     for i in range(torque.shape[0]):
         torque[i] = p.load * model[i]
 
@@ -428,7 +366,7 @@ def solve_free(
     data: Any,
     arrays: tuple[Any, ...],
     tasks: Array,
-    room: tuple[Array, Array, Array, Array],
+    room: tuple[Matrices, Array],
     found: tuple[Array, Array, Array],
 ) -> int:
     """Solve a tick in which no limit acts: ``FREE`` where none does.
@@ -440,11 +378,9 @@ def solve_free(
     p, r = qp[0], data[0]
     if bounds_needed(p, r):
         return BRAKED
-    torque_limit, bounds, work, model = room
-    kind = assemble(p, r, arrays, tasks, torque_limit, bounds, work)
+    m, model = room
+    kind = assemble(p, r, arrays, tasks, m)
     if kind == FREE:
-        nv, nu, forces, rows = sizes(p, arrays, bounds)
-        out = matrices(work, nv, nu, forces, rows)
-        torques(out[2], out[7], torque_limit, model)
-        answer(p, work, model, found)
+        torques(m, m.minimum, model)
+        answer(p, m, model, found)
     return kind

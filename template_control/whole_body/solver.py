@@ -179,62 +179,50 @@ def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) 
 
 
 class Workspace:
-    """Matrices and ProxQP object for so many contacts, and ``bounded`` accelerations of joints."""
+    """Matrices and ProxQP object for so many contacts, and ``bounded`` accelerations of joints.
 
-    def __init__(self, robot: Robot, contacts: int, bounded: int = 0) -> None:
-        nv, nu, directions = robot.nv, len(robot.torque_limit), robot.contact_rows
-        rows = nu + problem.rows_per_contact(directions) * contacts + bounded
-        self._identity = np.eye(nu)
-        numbers = (nu + 1) * (nv + directions * contacts) + nu * (nu + 2) + rows * (nu + 2)
-        self.work = np.zeros(numbers)
-        self.matrices = problem.Matrices(
-            *problem.matrices(self.work, nv, nu, directions * contacts, rows)
-        )
-        self.bounds = np.zeros((2, bounded))
-        self.rows = rows
+    ``limit`` (nu,) are the model's limits of torque [N m], which the matrices share.
+    """
+
+    def __init__(self, robot: Robot, limit: Array, contacts: int, bounded: int = 0) -> None:
+        nu, forces = len(limit), robot.contact_rows * contacts
+        rows = nu + problem.rows_per_contact(robot.contact_rows) * contacts + bounded
+        maps = (robot.nv, nu + 1), (forces, nu + 1)
+        shapes = ((2, bounded), *maps, (nu, nu), (nu,), (rows, nu), (rows,), (rows,), (nu,))
+        self.matrices = problem.Matrices(limit, *(np.zeros(shape) for shape in shapes))
         self._proxqp = load_proxqp()
-        self._solved = self._proxqp.QPSolverOutput.PROXQP_SOLVED
         self.qp = self._new()
         self.ready = False
 
     def _new(self) -> Any:
-        proxqp = self._proxqp
-        qp = proxqp.dense.QP(
-            len(self._identity),
-            0,
-            self.rows,
-            False,
-            proxqp.dense.HessianType.Dense,
-            proxqp.dense.DenseBackend.PrimalDualLDLT,
-        )
-        settings = qp.settings
+        dense, (rows, nu) = self._proxqp.dense, self.matrices.constraint.shape
+        kinds = dense.HessianType.Dense, dense.DenseBackend.PrimalDualLDLT
+        qp = dense.QP(nu, 0, rows, False, *kinds)
         # The tolerance is tight because a warm start stops as soon as it is met.
-        settings.eps_abs = 1e-8
-        settings.eps_rel = 0.0
+        qp.settings.eps_abs, qp.settings.eps_rel = 1e-8, 0.0
         # Without caps an infeasible problem runs for minutes.
-        settings.max_iter = 40
-        settings.max_iter_in = 40
+        qp.settings.max_iter = qp.settings.max_iter_in = 40
         return qp
 
     def solve(self) -> bool:
         """Solve for the current matrices; warm, and once more from scratch if that fails."""
+        m, solved = self.matrices, self._proxqp.QPSolverOutput.PROXQP_SOLVED
+        guess = self._proxqp.InitialGuess
         if self.ready:
-            m = self.matrices
             self.qp.update(g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
             self.qp.solve()
-            if self.qp.results.info.status == self._solved:
+            if self.qp.results.info.status == solved:
                 return True
             # A failed solve leaves penalties behind with which the next one can stop at a
             # wrong answer, even after `init`; a new object costs microseconds.
             self.qp = self._new()
-        qp = self.qp
-        qp.settings.initial_guess = self._proxqp.InitialGuess.NO_INITIAL_GUESS
-        m = self.matrices
-        qp.init(H=self._identity, g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
-        qp.solve()
-        self.ready = bool(qp.results.info.status == self._solved)
+        self.qp.settings.initial_guess = guess.NO_INITIAL_GUESS
+        identity = np.eye(len(m.gradient))
+        self.qp.init(H=identity, g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
+        self.qp.solve()
+        self.ready = bool(self.qp.results.info.status == solved)
         if self.ready:
-            qp.settings.initial_guess = self._proxqp.InitialGuess.WARM_START_WITH_PREVIOUS_RESULT
+            self.qp.settings.initial_guess = guess.WARM_START_WITH_PREVIOUS_RESULT
         else:
             self.qp = self._new()
         return self.ready
@@ -267,11 +255,12 @@ class WholeBodyQp:
         now["stop_time"], now["load"] = o.stop_horizon / o.speed_share, 1.0
         self._options = o
         nu, most = len(robot.torque_limit), int(robot.data["contacts"][0])
+        self._limit, self._torque = np.zeros(nu), np.zeros(nu)  # of the model
         self.workspaces, self._braked = (
-            [Workspace(robot, contacts, bounded) for contacts in range(most + 1)]
+            [Workspace(robot, self._limit, contacts, bounded) for contacts in range(most + 1)]
             for bounded in (0, nu)
         )
-        self._torque = np.zeros(nu)
+        self._rooms = [(workspace.matrices, self._torque) for workspace in self.workspaces]
         self._contacts, self._sizes = self.data["contacts"], (nu, robot.nv, robot.contact_rows)
         self._load = 1.0
         self.torque_limit = robot.torque_limit * o.torque_scale
@@ -308,7 +297,7 @@ class WholeBodyQp:
         kind = problem.solve_free(self.data, robot.data, robot.arrays, tasks.table, room, found)
         return self.finish(kind, tasks, found)
 
-    def room(self, load: float) -> tuple[Array, Array, Array, Array]:
+    def room(self, load: float) -> tuple[problem.Matrices, Array]:
         """Arrays for :func:`.problem.solve_free` of the stance in ``data``, the same for the same.
 
         ``load`` is as for :meth:`solve`.
@@ -344,27 +333,25 @@ class WholeBodyQp:
         limit = self.torque_limit / load
         # The product is rounded once more, and may be a hair beyond.
         beyond = load * limit > self.torque_limit
-        self._limit = np.where(beyond, np.nextafter(limit, 0.0), limit)
+        self._limit[:] = np.where(beyond, np.nextafter(limit, 0.0), limit)
         self._load = load
         self.data["load"] = load
-        self._rooms = [(self._limit, w.bounds, w.work, self._torque) for w in self.workspaces]
 
     def _solve_limited(
         self, kind: int, tasks: TaskStack, found: tuple[Array, Array, Array]
     ) -> tuple[float, bool]:
         """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
-        now, robot, limit = self.data[0], self.robot, self._limit
-        contacts = int(now["contacts"])
+        now, robot, braked = self.data[0], self.robot, kind == problem.BRAKED
+        contacts, seconds, solved = int(now["contacts"]), 0.0, False
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
-        slacks = (-np.inf, 0.0, None) if kind == problem.BRAKED else (None,)
-        seconds, solved, assembled = 0.0, False, kind != problem.BRAKED
+        slacks = (-np.inf, 0.0, None) if braked else (None,)
         for slack in slacks:
             w = (self.workspaces if slack is None else self._braked)[contacts]
             if slack is not None:
-                bound_joints(robot, self._options, w.bounds, slack)
-            if not assembled:
-                arguments = (robot.arrays, tasks.table, limit, w.bounds, w.work)
-                kind = problem.assemble(now, robot.data[0], *arguments)
+                bound_joints(robot, self._options, w.matrices.bounds, slack)
+            if braked:
+                state = now, robot.data[0], robot.arrays
+                kind = problem.assemble(*state, tasks.table, w.matrices)
             best, solved = w.matrices.minimum, kind == problem.FREE
             if not solved:
                 tasks.check_finite()  # with such a number no constraint is kept
@@ -373,21 +360,17 @@ class WholeBodyQp:
                 seconds += time.perf_counter() - start
                 best = w.qp.results.x
             if solved:
-                problem.torques(w.matrices.factor, best, limit, self._torque)
+                problem.torques(w.matrices, best, self._torque)
                 break
         else:
-            self._tell(kind != problem.SINGULAR, contacts)
-            np.clip(self._torque, -limit, limit, out=self._torque)
-        problem.answer(now, w.work, self._torque, found)
+            if not self._failing:
+                regular = "has no solution within its limits"
+                _LOG.warning(
+                    "%s: the QP with %d contacts on the ground %s: the last torques are kept",
+                    robot.name,
+                    contacts,
+                    "is singular" if kind == problem.SINGULAR else regular,
+                )
+            np.clip(self._torque, -self._limit, self._limit, out=self._torque)
+        problem.answer(now, w.matrices, self._torque, found)
         return seconds, solved
-
-    def _tell(self, regular: bool, contacts: int) -> None:
-        """Log that the last solved torques are kept, once for failures in a row."""
-        if not self._failing:
-            why = "has no solution within its limits" if regular else "is singular"
-            _LOG.warning(
-                "%s: the QP with %d contacts on the ground %s: the last torques are kept",
-                self.robot.name,
-                contacts,
-                why,
-            )

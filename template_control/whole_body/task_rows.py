@@ -43,24 +43,37 @@ COM, FOOT, MOMENTUM, POSTURE, ORIENTATION, SPIN, SIDE_FOOT, SPARE, SOLE, SWAY = 
 
 
 @compiled
+def _momentum_speed_row(
+    r: Any, arrays: tuple[Any, ...], height: float, axis: int, row: Array
+) -> None:
+    """Write the rate of the CoM's speed with the momentum, ahead (0) or to the left (1).
+
+    The angular momentum counts over m h, h the ``height``: that about the pitch's axis ahead, that
+    about x, which moves the CoM the other way, to the left.
+    """
+    com, momentum, turn, sign = arrays[2], arrays[3], 1 - axis, 1.0 - 2.0 * axis
+    nv, moment = com.shape[1], r.mass * height
+    for k in range(nv):
+        spin = momentum[min(turn, len(momentum) - 1), k] / moment
+        row[k] = com[axis, k] + sign * spin
+    turning = r.momentum_bias[turn] - r.momentum[turn] * r.com_velocity[UP] / height
+    row[nv + BIAS] = r.com_bias[axis] + sign * (turning / moment)
+
+
+@compiled
 def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
     """Write the rows of a :class:`ComTask`, and ``lift`` of references; see :func:`write_rows`."""
-    com, momentum = arrays[2], arrays[3]
-    kp, kd, nv = task.gains[0], task.gains[1], com.shape[1]
-    up, pitch = com.shape[0] - 1, len(momentum) // 2
-    ref, now = want.com, want.com_now
-    height, rise = now[1], r.com_velocity[UP]
-    moment = r.mass * height
+    com, kp, kd = arrays[2], task.gains[0], task.gains[1]
+    up, nv, ref, now = com.shape[0] - 1, com.shape[1], want.com, want.com_now
+    _momentum_speed_row(r, arrays, now[1], 0, rows[0])
     for k in range(nv):
-        rows[0, k] = com[0, k] + momentum[pitch, k] / moment
         rows[1, k] = com[up, k]
-    turning = r.momentum_bias[1] - r.momentum[1] * rise / height
-    rows[0, nv + BIAS], rows[1, nv + BIAS] = r.com_bias[0] + turning / moment, r.com_bias[UP]
+    rows[1, nv + BIAS] = r.com_bias[UP]
     ahead = ref[4] + kp * (ref[0] - now[0]) + kd * (ref[2] - now[2]) + want.com_push
     if task.gains[2] > 0.0:
         ahead -= kp * want.lead
     if task.gains[3] > 0.0:
-        ahead += task.gains[3] * (ref[5] + r.gravity) / height * (now[0] - ref[0])
+        ahead += task.gains[3] * (ref[5] + r.gravity) / now[1] * (now[0] - ref[0])
     if not np.isnan(want.ahead):
         ahead = want.ahead
     want.lift = kp * (ref[1] - now[1]) + kd * (ref[3] - now[3])
@@ -68,23 +81,31 @@ def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array)
 
 
 @compiled
-def foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
+def _contact_row(task: Any, r: Any, contact: Array, want: Any, axis: int, row: Array) -> None:
+    """Write the row by which a foot's contact follows its reference along an axis."""
+    foot, nv = want.feet[task.leg], contact.shape[2]
+    point, wanted = r.group[foot, task.contact], want.foot[foot, axis // UP]
+    if axis == _SIDE:
+        wanted = want.side[foot]
+    for k in range(nv):
+        row[k] = contact[point, min(axis, contact.shape[1] - 1), k]
+    row[nv + BIAS], away = r.contact_bias[point, axis], want.offset[point, axis]
+    ahead = wanted[0] + away[0] - r.contact_position[point, axis]
+    faster = wanted[1] + away[1] - r.contact_velocity[point, axis]
+    row[nv + DESIRED] = wanted[2] + away[2] + task.gains[0] * ahead + task.gains[1] * faster
+    row[nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[axis // UP]
+
+
+@compiled
+def foot_rows(task: Any, r: Any, contact: Array, want: Any, rows: Array) -> None:
     """Write the rows of a :class:`FootTask`."""
-    contact, foot = arrays[4], want.feet[task.leg]
-    kp, kd, hold_p, hold_d = task.gains[0], task.gains[1], task.gains[2], task.gains[3]
-    point, nv = r.group[foot, task.contact], contact.shape[2]
-    for row in range(2):
-        axis, direction = row * UP, row * (min(contact.shape[1], UP + 1) - 1)
-        for k in range(nv):
-            rows[row, k] = contact[point, direction, k]
-        rows[row, nv + BIAS] = r.contact_bias[point, axis]
-        wanted, away = want.foot[foot, row], want.offset[point, axis]
-        ahead = wanted[0] + away[0] - r.contact_position[point, axis]
-        faster = wanted[1] + away[1] - r.contact_velocity[point, axis]
-        rows[row, nv + DESIRED] = wanted[2] + away[2] + kp * ahead + kd * faster
-        rows[row, nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[row]
+    _contact_row(task, r, contact, want, 0, rows[0])
+    _contact_row(task, r, contact, want, UP, rows[1])
+    foot, nv = want.feet[task.leg], contact.shape[2]
+    point = r.group[foot, task.contact]
     ahead = want.furthest[foot] + want.offset[point, 0, 0] - r.contact_position[point, 0]
-    held = hold_p * ahead + hold_d * (r.hip_speed - r.contact_velocity[point, 0])
+    faster = r.hip_speed - r.contact_velocity[point, 0]
+    held = task.gains[2] * ahead + task.gains[3] * faster
     rows[0, nv + DESIRED] = min(rows[0, nv + DESIRED], held)
 
 
@@ -133,21 +154,6 @@ def momentum_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: A
 
 
 @compiled
-def side_foot_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`SideFootTask`."""
-    contact, foot, nv = arrays[4], want.feet[task.leg], rows.shape[1] - 3
-    point = r.group[foot, task.contact]
-    wanted, off = want.side[foot], want.offset[point, _SIDE]
-    for k in range(nv):
-        rows[0, k] = contact[point, _SIDE, k]
-    rows[0, nv + BIAS] = r.contact_bias[point, _SIDE]
-    away = wanted[0] + off[0] - r.contact_position[point, _SIDE]
-    behind = wanted[1] + off[1] - r.contact_velocity[point, _SIDE]
-    rows[0, nv + DESIRED] = wanted[2] + off[2] + task.gains[0] * away + task.gains[1] * behind
-    rows[0, nv + WEIGHT] = 0.0 if want.stands[point] else task.weight[0]
-
-
-@compiled
 def spare_joint_rows(task: Any, r: Any, arrays: tuple[Any, ...], rows: Array) -> None:
     """Write the rows of a :class:`SpareJointTask`."""
     joints, nv = arrays[6], rows.shape[1] - 3
@@ -192,18 +198,6 @@ def _turned_back(axes: Array, row: int, column: int, c: float, s: float) -> floa
 
 
 @compiled
-def sway_rows(r: Any, arrays: tuple[Any, ...], want: Any, rows: Array) -> None:
-    """Write the row of a :class:`SwayTask`."""
-    com, momentum, height = arrays[2], arrays[3], want.com_now[1]
-    nv, moment = com.shape[1], r.mass * height
-    for k in range(nv):
-        rows[0, k] = com[_SIDE, k] - momentum[0, k] / moment
-    turning = r.momentum_bias[0] - r.momentum[0] * r.com_velocity[UP] / height
-    rows[0, nv + BIAS] = r.com_bias[_SIDE] - turning / moment
-    rows[0, nv + DESIRED] = want.sway
-
-
-@compiled
 def write_rows(
     program: Any, data: Any, arrays: tuple[Any, ...], references: Any, table: Array
 ) -> None:
@@ -215,7 +209,7 @@ def write_rows(
         if task.kind == COM:
             com_rows(task, r, arrays, want, rows)
         elif task.kind == FOOT:
-            foot_rows(task, r, arrays, want, rows)
+            foot_rows(task, r, arrays[4], want, rows)
         elif task.kind == MOMENTUM or task.kind == SPIN:
             momentum_rows(task, r, arrays, want, rows)
         elif task.kind == POSTURE:
@@ -223,10 +217,11 @@ def write_rows(
         elif task.kind == ORIENTATION:
             orientation_rows(task, r, arrays, want, rows)
         elif task.kind == SIDE_FOOT:
-            side_foot_rows(task, r, arrays, want, rows)
+            _contact_row(task, r, arrays[4], want, _SIDE, rows[0])
         elif task.kind == SOLE:
             sole_rows(task, r, arrays, want, rows)
         elif task.kind == SWAY:
-            sway_rows(r, arrays, want, rows)
+            _momentum_speed_row(r, arrays, want.com_now[1], _SIDE, rows[0])
+            rows[0, table.shape[1] - 3 + DESIRED] = want.sway
         else:
             spare_joint_rows(task, r, arrays, rows)
