@@ -79,6 +79,9 @@ class Biped(Robot):
         ankle_height: of flat feet, over the sole; 0 of point feet [m].
         toe_ahead: of flat feet, of the ankle; 0 of point feet [m].
         spread: (n, 2) x and y of each contact from its foot, where the legs hang down [m].
+        half_length: by how far ahead of its middle a template leg's foot bears, and behind; 0 of a
+            foot that is a point [m].
+        half_width: the same to the left and right [m].
         joint_sign: (nu,) 1 of a hip or knee that turns about +y, -1 about -y; of joints above the
             hip the sign of their axis' y.
         leg_mass: of the heavier leg [kg].
@@ -160,32 +163,27 @@ class Biped(Robot):
             [data.oMi[j].translation for j in range(first, model.njoints)]
         )
         self.heading_frame: Array = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
-        self.data["foot_radius"], self.data["leg_length"] = foot_radius, self.leg_length
+        now["foot_radius"], now["leg_length"] = foot_radius, self.leg_length
+        now["sway"], now["leg_lean"] = 1.0, inf
         self._sources = sources(model, data, self._foot_ids, self._joint_limits)
         if flat:
-            self._stop_knees()
-        self._take_patches()
+            self._take_patches()
         self._look()
         self.spread: Array = np.zeros((len(feet), 2))
         self._prepare()
+        self.half_length, self.half_width = self._half_sides()
 
-    def _stop_knees(self) -> None:
-        """Let the knees stop where the leg is straight.
+    def _take_patches(self) -> None:
+        """Write what is constant of the soles, and let the knees stop where the leg is straight.
 
         One that bends backward, as G1's may by 0.09 rad, is trapped: the CoM can only sink after
         it has risen.
         """
+        now, data, model = self.data[0], self.model.createData(), self.model
         straight = self._neutral[-len(self.joint_stops) :]
         for _, knee, _ in self.hinges:
             beyond = np.argmin(np.abs(self.joint_range[knee] - straight[knee]))
             self.joint_stops[knee, beyond] = straight[knee]
-
-    def _take_patches(self) -> None:
-        """Write what is constant of the soles."""
-        now, data, model = self.data[0], self.model.createData(), self.model
-        now["sway"], now["leg_lean"] = 1.0, inf
-        if not self.patches:
-            return
         for i, patch in enumerate(self.patches):
             now["sole_centre"][i], now["sole_half"][i] = patch.centre, patch.half_sides
         pin.framesForwardKinematics(model, data, self._neutral)
@@ -229,40 +227,23 @@ class Biped(Robot):
         """Whether the feet of the template's legs are groups of contacts, as a quadruped's."""
         return any(len(group) > 1 for group in self.groups)
 
-    @property
-    def half_length(self) -> float:
-        """By how far ahead of its middle a template leg's foot bears, and behind [m].
-
-        0 of a foot that is a point.
-        """
-        return self._half_side(0)
-
-    @property
-    def half_width(self) -> float:
-        """The same to the left and right [m]."""
-        return self._half_side(1)
-
-    def _half_side(self, axis: int) -> float:
-        if self.patches:
-            return min(float(p.half_sides[axis] - abs(p.centre[axis])) for p in self.patches)
-        places = self.spread[:, axis]
-        return 0.5 * min(float(np.ptp(places[list(group)])) for group in self.groups if group)
+    def _half_sides(self) -> tuple[float, float]:
+        """``half_length`` and ``half_width``."""
+        sides = [patch.half_sides - np.abs(patch.centre) for patch in self.patches] or [
+            0.5 * np.ptp(self.spread[list(group)], axis=0) for group in self.groups if group
+        ]
+        length, width = np.min(sides, axis=0).tolist()
+        return length, width
 
     @property
     def foot_jacobian(self) -> Array:
         """See the class."""
-        return self._means(self.contact_jacobian[:, :: _SAGITTAL[self.directions]])
+        return leg_means(self.contact_jacobian[:, :: _SAGITTAL[self.directions]], self.groups)
 
     @property
     def foot_bias(self) -> Array:
         """See the class."""
-        return self._means(self.contact_bias[:, :: _SAGITTAL[self.directions]])
-
-    def _means(self, values: Array) -> Array:
-        """(2, ...) means over the groups of contacts; views of contacts that are feet."""
-        if self.groups == SINGLE:
-            return values
-        return leg_means(values, self.groups)
+        return leg_means(self.contact_bias[:, :: _SAGITTAL[self.directions]], self.groups)
 
     def changed(
         self,
@@ -292,10 +273,9 @@ class Biped(Robot):
             if not self.patches:
                 add_feet(self.path, urdf, model, self.feet)
         model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
-        rest = self.feet, self.foot_radius, self.walk
+        same = self.feet, self.foot_radius, self.walk
         legs = feet_of_legs(self.path, model, self.feet, groups) if groups else self.groups
-        same = {"groups": legs, "patches": self.patches}
-        return type(self)(self.path, urdf, model, *rest, **same)  # type: ignore[arg-type]
+        return type(self)(self.path, urdf, model, *same, groups=legs, patches=self.patches)
 
     @staticmethod
     @abstractmethod

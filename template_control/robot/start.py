@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -22,6 +22,8 @@ from template_control.robot.terms import PLANAR_DOF
 _SHORT = 0.15  # of a step of Newton's method [rad]
 _LONGEST = 0.2  # the same, of a floating-base robot [rad, m]
 _EXACT = 1e-12  # [m, rad]
+
+AnyBiped = TypeVar("AnyBiped", PlanarBiped, FloatingBaseBiped)
 
 
 @dataclass(frozen=True)
@@ -60,14 +62,22 @@ class Pose(Checked):
 def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     """(nv,) q [m, rad] and (nv,) v [m/s, rad/s] of a robot in a pose, which it is updated to."""
     # From far away Newton's full step may bend a knee the wrong way; short ones do not.
-    q = _bent_to(
-        robot,
-        lambda q, longest: _configuration(robot, pose, q, longest),
-        (np.inf, _SHORT),
-        pose,
-    )
+    q = _bent_to(robot, pose, _planar_configuration, (np.inf, _SHORT))
     robot.update(q, np.zeros(robot.nv))
-    return q, _velocity(robot, pose, q)
+    feet, speeds = _feet(robot, pose, pose.feet_velocity)
+    rows = np.zeros((robot.nv, robot.nv))
+    rows[0:2] = robot.com_jacobian
+    rows[2, 2] = 1.0
+    rows[3:] = robot.foot_jacobian[feet].reshape(-1, robot.nv)
+    momentum = _angular_momentum_row(robot, q)
+    if pose.momentum_speed:
+        rows[0] += momentum / (robot.mass * pose.com[1])
+    if pose.angular_momentum is not None:
+        rows[2] = momentum
+    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *speeds.ravel()]
+    v = _solved(robot, rows, np.array(wanted))
+    robot.update(q, v)
+    return q, v
 
 
 @checked
@@ -122,7 +132,7 @@ def floating_state_in(robot: FloatingBaseBiped, pose: Pose) -> tuple[Array, Arra
         RobotError: if the legs do not reach, or joints would be beyond their limits.
     """
     robot.face(0.0, np.zeros(2))
-    q = _bent_to(robot, lambda q, _: _floating_configuration(robot, pose, q), (_LONGEST,), pose)
+    q = _bent_to(robot, pose, _floating_configuration, (_LONGEST,))
     robot.update(q, np.zeros(robot.nv))
     rows, momentum = robot.placing_rows(), robot.jacobians.momentum
     weight = robot.mass * pose.com[2]
@@ -142,10 +152,10 @@ def floating_state_in(robot: FloatingBaseBiped, pose: Pose) -> tuple[Array, Arra
 
 
 def _bent_to(
-    robot: Biped,
-    solve: Callable[[Array, float], Array | None],
-    longest: Sequence[float],
+    robot: AnyBiped,
     pose: Pose,
+    solve: Callable[[AnyBiped, Pose, Array, float], Array | None],
+    longest: Sequence[float],
 ) -> Array:
     """(nq,) configuration of a pose, with knees bent as their ranges allow.
 
@@ -161,7 +171,7 @@ def _bent_to(
     low, high = robot.joint_range.T
     for backward in (False, True):
         for length in longest:
-            q = solve(robot.bent(backward), length)
+            q = solve(robot, pose, robot.bent(backward), length)
             if q is None:
                 continue
             angles = q[-len(low) :]
@@ -206,7 +216,7 @@ def _newton(
     return None
 
 
-def _configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
+def _planar_configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: float) -> Array | None:
     """(nv,) q of a pose by steps of at most ``longest`` [rad] from bent legs; None: not found."""
     feet, wanted = _feet(robot, pose, pose.feet)
     q[:PLANAR_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
@@ -237,26 +247,10 @@ def _feet(robot: PlanarBiped, pose: Pose, values: Array) -> tuple[list[int], Arr
     return list(feet), values[list(legs)]
 
 
-def _velocity(robot: PlanarBiped, pose: Pose, q: Array) -> Array:
-    """(nv,) v of a pose at its configuration ``q``; the robot is updated to both."""
-    feet, speeds = _feet(robot, pose, pose.feet_velocity)
-    rows = np.zeros((robot.nv, robot.nv))
-    rows[0:2] = robot.com_jacobian
-    if pose.momentum_speed:
-        rows[0] += _angular_momentum_row(robot, q) / (robot.mass * pose.com[1])
-    if pose.angular_momentum is None:
-        rows[2, 2] = 1.0
-    else:
-        rows[2] = _angular_momentum_row(robot, q)
-    rows[3:] = robot.foot_jacobian[feet].reshape(-1, robot.nv)
-    wanted = [*pose.com_velocity, pose.angular_momentum or 0.0, *speeds.ravel()]
-    v = _solved(robot, rows, np.array(wanted))
-    robot.update(q, v)
-    return v
-
-
-def _floating_configuration(robot: FloatingBaseBiped, pose: Pose, q: Array) -> Array | None:
-    """As :func:`_configuration`, of a floating-base robot."""
+def _floating_configuration(
+    robot: FloatingBaseBiped, pose: Pose, q: Array, longest: float
+) -> Array | None:
+    """As :func:`_planar_configuration`, of a floating-base robot."""
     q[:3] = pose.com[0], pose.com[1], 0.9 * pose.com[2]
     upright = pin.rpy.rpyToMatrix(0.0, pose.pitch, 0.0)
     feet = _by_contact(robot, pose, pose.feet)
@@ -279,7 +273,7 @@ def _floating_configuration(robot: FloatingBaseBiped, pose: Pose, q: Array) -> A
             rows[7 + 3 * foot] -= r * turning[0]
         return robot.smallest_motion(rows, -error)
 
-    return _newton(robot, q, error, step, _LONGEST, 100)
+    return _newton(robot, q, error, step, longest, 100)
 
 
 def _by_contact(robot: FloatingBaseBiped, pose: Pose, values: Array) -> Array:
