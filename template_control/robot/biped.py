@@ -238,12 +238,17 @@ class Biped(Robot):
     @property
     def foot_jacobian(self) -> Array:
         """See the class."""
-        return leg_means(self.contact_jacobian[:, :: _SAGITTAL[self.directions]], self.groups)
+        return self._means(self.contact_jacobian)
 
     @property
     def foot_bias(self) -> Array:
         """See the class."""
-        return leg_means(self.contact_bias[:, :: _SAGITTAL[self.directions]], self.groups)
+        return self._means(self.contact_bias)
+
+    def _means(self, values: Array) -> Array:
+        """(2, ...) sagittal means over the groups of contacts; views of contacts that are feet."""
+        sagittal = values[:, :: _SAGITTAL[self.directions]]
+        return sagittal if self.groups == SINGLE else leg_means(sagittal, self.groups)
 
     def changed(
         self,

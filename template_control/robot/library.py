@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -165,11 +166,12 @@ def robot_path(name: str) -> Path:
         near, names = meant(name, SHIPPED), ", ".join(SHIPPED)
         raise RobotError(f"there is no robot {name!r}{near}: give one of {names}, or a URDF file")
     entry = _ENTRIES[name]
+    # A wheel carries our folder inside the package, a checkout next to it.
+    candidates = [root / "robots" / entry.file for root in (_PACKAGE, _PACKAGE.parent)]
     if entry.distribution:
-        candidates = _files(entry)
-    else:
-        # A wheel carries the folder inside the package, a checkout next to it.
-        candidates = [root / "robots" / entry.file for root in (_PACKAGE, _PACKAGE.parent)]
+        with suppress(importlib.metadata.PackageNotFoundError):
+            files = importlib.metadata.files(entry.distribution) or []
+            candidates = [Path(str(f.locate())) for f in files if f.name == entry.file]
     for path in candidates:
         if path.is_file():
             return path
@@ -177,15 +179,6 @@ def robot_path(name: str) -> Path:
         f"{entry.file} is missing from this installation: reinstall"
         f" {entry.distribution or 'the library'}"
     )
-
-
-def _files(entry: _Entry) -> list[Path]:
-    """Places of an entry's URDF in the package that brings it."""
-    try:
-        files = importlib.metadata.files(entry.distribution) or []
-    except importlib.metadata.PackageNotFoundError:
-        return []
-    return [Path(str(f.locate())) for f in files if f.name == entry.file]
 
 
 def _load(name: str | Path, kind: type[AnyBiped], **more: Any) -> AnyBiped:

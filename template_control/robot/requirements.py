@@ -34,53 +34,49 @@ _FLAT, _SWINGING = 6, 3  # joints of one with a flat foot, and those of them abo
 _DENSITY = (0.1, 2e4)
 
 
-def _check_feet(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
-    """Check that feet are there."""
+def _legs_apart(path: Path, model: pin.Model, feet: Sequence[str], base: int) -> list[list[int]]:
+    """Joints of each foot's leg, beyond the base's; checks that feet and legs are there."""
     for foot in feet:
         if not model.existFrame(foot, pin.FrameType.BODY):
             links = [f.name for f in model.frames if f.type == pin.FrameType.BODY]
             raise RobotError(f"{path} has no foot link {foot!r}: its links are {links}")
-
-
-def _check_legs_apart(path: Path, feet: Sequence[str], legs: Sequence[Sequence[int]]) -> None:
-    """Check that each foot has a leg of its own."""
+    legs = leg_joints(model, feet, base)
     for (one, leg), (other, another) in combinations(zip(feet, legs, strict=True), 2):
         if set(leg) & set(another):
             raise RobotError(f"{path}: feet {[one, other]} hang on the same leg: name one of each")
+    return legs
 
 
 def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
     """Check that base and legs are those of a planar biped with hips and knees, and have limits."""
-    kinds = [joint.shortname() for joint in model.joints][1:]
-    names = list(model.names)[1:]
-    hinged = [joint.nq == joint.nv == 1 for joint in model.joints[1:]]
+    joints = [
+        (name, joint.shortname()) for name, joint in zip(model.names, model.joints, strict=True)
+    ]
+    hinged = [joint.nq == joint.nv == 1 for joint in model.joints[1 : PLANAR_DOF + 1]]
     columns = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))
     base = np.eye(6)[[0, 2, 4]].T  # in the world's axes, the pitch joint at its origin
     given = columns[:, :PLANAR_DOF]
-    if not all(hinged[:PLANAR_DOF]) or given.shape != base.shape or not _near(given[3:], base[3:]):
-        first = list(zip(names, kinds, strict=True))[:PLANAR_DOF]
+    if not all(hinged) or given.shape != base.shape or not _near(given[3:], base[3:]):
         raise RobotError(
-            f"{path} is not planar: its first joints are {first},"
+            f"{path} is not planar: its first joints are {joints[1 : PLANAR_DOF + 1]},"
             " and must be prismatic x, prismatic z, revolute y; of a 3D robot, name the hips and"
             " knees as sagittal_joints"
         )
-    for name, turns, joint in zip(names, hinged, model.joints[1:], strict=True):
-        if name in names[:PLANAR_DOF]:
-            continue
-        axis = columns[:, joint.idx_v]
-        if not turns or abs(abs(axis[4]) - 1.0) > _PARALLEL:
+    own = slice(PLANAR_DOF + 1, None)
+    for (name, kind), joint in zip(joints[own], model.joints[own], strict=True):
+        if not joint.nq == joint.nv == 1 or abs(abs(columns[4, joint.idx_v]) - 1.0) > _PARALLEL:
             raise RobotError(
-                f"{path} is not planar: joint {name!r} is {joint.shortname()},"
+                f"{path} is not planar: joint {name!r} is {kind},"
                 " and must be revolute about y (with limits, not continuous)"
             )
     if not _near(given, base):
         raise RobotError(
-            f"{path}: joint {names[2]!r}, the base's pitch, is not at the world's origin with all"
-            " joints at 0, or a slide is not along the world's x or z: give the base's joints no"
-            " offset"
+            f"{path}: joint {joints[PLANAR_DOF][0]!r}, the base's pitch, is not at the world's"
+            " origin with all joints at 0, or a slide is not along the world's x or z: give the"
+            " base's joints no offset"
         )
     hinges = model.nv - PLANAR_DOF
-    if hinges == HINGES * LEGS and legs != LEGS:
+    if legs not in (1, LEGS) or (legs == 1 and hinges == HINGES * LEGS):
         raise RobotError(f"{legs} feet were named for {path}: a biped has two, a monopod one")
     if hinges != HINGES * legs:
         raise RobotError(
@@ -98,11 +94,7 @@ def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
 
 def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None:
     """Check that each foot has a hip and a knee of its own, and the trunk turns at the hips."""
-    if len(feet) not in (1, LEGS):
-        raise RobotError(f"{len(feet)} feet were named for {path}: a biped has two, a monopod one")
-    _check_feet(path, model, feet)
-    legs = leg_joints(model, feet, PLANAR_DOF)
-    _check_legs_apart(path, feet, legs)
+    legs = _legs_apart(path, model, feet, PLANAR_DOF)
     for foot, leg in zip(feet, legs, strict=True):
         if not leg:
             raise RobotError(f"{path}: foot {foot!r} hangs on no leg: name the link at its end")
@@ -127,14 +119,12 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool
         raise RobotError(
             f"{len(feet)} feet were named for {path}: a biped has two, a quadruped four"
         )
-    _check_feet(path, model, feet)
+    legs = _legs_apart(path, model, feet, _ROOT)
     for joint, name in list(zip(model.joints, model.names, strict=True))[2:]:
         if joint.nq != 1 or joint.nv != 1:
             raise RobotError(
                 f"{path}: joint {name!r} is {joint.shortname()}, and must be revolute with limits"
             )
-    legs = leg_joints(model, feet, 1)
-    _check_legs_apart(path, feet, legs)
     if model.inertias[_ROOT].mass <= 0.0:
         raise RobotError(
             f"{path}: the root link weighs nothing, and so does what is fixed to it: give the trunk"
