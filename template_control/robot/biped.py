@@ -23,8 +23,8 @@ from template_control.robot.legs import (
 from template_control.robot.requirements import add_feet, check_size, feet_of_legs
 from template_control.robot.robot import Robot
 from template_control.robot.sole import Patch
-from template_control.robot.terms import UP, sources
-from template_control.robot.urdf import with_masses
+from template_control.robot.terms import FLOATING_DOF, UP, sources
+from template_control.robot.urdf import build_model, with_masses
 from template_control.structured import Number
 
 SINGLE = ((0,), (1,))
@@ -271,7 +271,7 @@ class Biped(Robot):
         urdf, model = self.urdf, self.model.copy()
         if masses:
             urdf = with_masses(self.path, urdf, masses)
-            model = self._model_of(self.path, urdf)
+            model = build_model(self.path, urdf, self.base_dof == FLOATING_DOF)
             model.name = self.name
             for foot, patch in zip(self.feet, self.patches, strict=False):
                 add_foot_frame(model, foot, patch.placement)
@@ -281,11 +281,6 @@ class Biped(Robot):
         same = self.feet, self.foot_radius, self.walk
         legs = feet_of_legs(self.path, model, self.feet, groups) if groups else self.groups
         return type(self)(self.path, urdf, model, *same, groups=legs, patches=self.patches)
-
-    @staticmethod
-    @abstractmethod
-    def _model_of(path: Path, urdf: str) -> pin.Model:
-        """Pinocchio's model of a URDF's text."""
 
     @abstractmethod
     def _prepare(self) -> None:
@@ -309,7 +304,6 @@ class Biped(Robot):
             q[places] += (1.0 if ahead != backward else -1.0) * sign * _BENT[: len(joints)]
         return q
 
-    @abstractmethod
     def moved(self, q: Array, step: Array) -> Array:
         """(nq,) the configuration that a small motion leads to.
 
@@ -317,6 +311,7 @@ class Biped(Robot):
             q: (nq,) configuration.
             step: (nv,) the motion, in the coordinates of the velocity [m, rad].
         """
+        return np.asarray(pin.integrate(self.model, q, step))
 
     @abstractmethod
     def hip_height(self, q: Array) -> float:

@@ -75,11 +75,6 @@ class FloatingBaseBiped(Biped):
     directions = 3
     sway = Number("sway")
 
-    @staticmethod
-    def _model_of(path: Path, urdf: str) -> pin.Model:
-        build_model(path, urdf)  # which says what is wrong with it
-        return pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
-
     def _prepare(self) -> None:
         model, data = self.model, self._data
         placing = {joint for leg in self.legs for joint in leg}
@@ -187,23 +182,20 @@ class FloatingBaseBiped(Biped):
         where all are at 0 it is nearly straight and its sole level.
 
         Args:
-            path: the URDF file.
             feet: the foot links; of a biped left then right, of a quadruped four.
-            foot_radius: of spheres to be put into the feet [m]; None to keep the feet's own.
             limits: in place of the URDF's; None to keep those.
-            walk: see :class:`~template_control.robot.biped.Biped`.
             groups: the feet, by their places in ``feet``, of each of the two template legs; None:
                 one each of a biped, the diagonal pairs of a quadruped, with which it trots.
             locked: positions of joints that are held there [rad, m]; with a joint those that mimic
                 it.
-            foot_offset: of the spheres' centres from the foot links' origins, in the links' axes
-                [m]: a sole is below its ankle.
-            lossless: whether the joints' damping and friction are left out.
             flat_feet: whether a biped stands on soles, which are found from the feet's collision
                 shapes. Joints that are in no leg are then held at 0, unless ``locked`` says where.
             sole: the left one, where it is not to be found.
             upper_body: whether those of them that ``locked`` does not name move, and a task keeps
                 them at 0, or where their range is nearest to it.
+
+        The rest as in :meth:`PlanarBiped.from_urdf`; without ``foot_radius`` the feet's own
+        spheres are kept.
 
         Raises:
             RobotError: if the file is missing, no URDF, no such robot, or lacks a foot; if a mass,
@@ -229,7 +221,7 @@ class FloatingBaseBiped(Biped):
             urdf_edits.take_points(path, tree)
         urdf_edits.spheres(path, tree, feet, foot_radius, foot_offset)
         urdf = urdf_edits.complete(path, tree)
-        model = cls._model_of(path, urdf)
+        model = build_model(path, urdf, floating=True)
         check_floating(path, model, feet, flat)
         check_bodies(path, tree, model, _ROOT + 1)
         if flat:
@@ -310,10 +302,6 @@ class FloatingBaseBiped(Biped):
         out = np.array(point)
         out[..., 0], out[..., 1] = x0 + c * x - s * y, y0 + s * x + c * y
         return out
-
-    def moved(self, q: Array, step: Array) -> Array:
-        """See :meth:`~template_control.robot.biped.Biped.moved`."""
-        return np.asarray(pin.integrate(self.model, q, step))
 
     def between(self, q: Array, other: Array) -> Array:
         """(nv,) the motion that leads from one configuration to another one [m, rad].

@@ -60,7 +60,6 @@ class PlanarBiped(Biped):
 
     base_dof = base_joints = PLANAR_DOF
     directions = 2
-    _model_of = staticmethod(build_model)
 
     def _prepare(self) -> None:
         model = self.model
@@ -72,9 +71,7 @@ class PlanarBiped(Biped):
         self.foot_turning[:, _PITCH] = 1.0
         for row, leg in zip(self.foot_turning, self.legs, strict=False):
             row[[PLANAR_DOF + joint for joint in leg]] = self.joint_sign[list(leg)]
-        effects, com, momentum, contact, _, joints = self.arrays[1:]
-        out = effects, com, momentum, contact, joints
-        self._kept = keep((self._sources, self.data, out))
+        self._kept = keep((self._sources, self.data, self.arrays[1:]))
 
     @classmethod
     @checked
@@ -148,10 +145,6 @@ class PlanarBiped(Biped):
             angle: of the axes' x over the horizontal [rad].
         """
         self.model.gravity.linear = self.gravity * np.array([-sin(angle), 0.0, -cos(angle)])
-
-    def moved(self, q: Array, step: Array) -> Array:
-        """See :meth:`~.biped.Biped.moved`."""
-        return q + step
 
     def hip_height(self, q: Array) -> float:
         """Height of the point the legs hang from [m]; the base joint is placed there."""

@@ -232,12 +232,12 @@ def gather_planar(kept: Any, q: Array, v: Array) -> bool:
 
     They are of the frame whose x points where the robot goes, as ``facing`` of the data says: the
     world's, or that turned by half a turn about the vertical. ``kept`` are the views of
-    :func:`sources`, ``ROBOT_DATA`` and some of :class:`Jacobians`, which are overwritten.
+    :func:`sources`, ``ROBOT_DATA`` and most of :class:`Jacobians`, which are overwritten.
     """
     views, data, out = kept.value
     centre, speed, pull, momentum, weight, points = views[:6]
     com_jacobian, centroidal, jacobian, carries, limits = views[6:]
-    effects, jcom, jspin, contact, joints = out
+    effects, jcom, jspin, contact, _, joints = out
     s = data[0]
     finite, on = gather_joints(q, v, limits, s, effects, joints), onward(s.facing)
     s.com[0], s.com[UP] = on * centre[0], centre[2]
@@ -294,7 +294,7 @@ def _gather_feet(s: Any) -> None:
 def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     """Write the terms at the state that Pinocchio has last computed, in the heading frame.
 
-    As :func:`gather_planar`; ``kept`` has more Jacobians, and last the robot's ``heading_frame``,
+    As :func:`gather_planar`; ``kept`` has last the robot's ``heading_frame``,
     views of the trunk's rotation to the world, of the places in the world and axes of each hip's
     joint, and a point of each hip's axis in the plane in which the leg swings [m].
     """

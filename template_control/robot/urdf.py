@@ -84,10 +84,13 @@ def _drop_world(robot: ET.Element) -> None:
             robot.remove(links[parent])
 
 
-def build_model(path: Path, urdf: str) -> pin.Model:
-    """Pinocchio's model of a URDF's text; a RobotError if it does not read it."""
+def build_model(path: Path, urdf: str, floating: bool = False) -> pin.Model:
+    """Pinocchio's model of a URDF's text, its root link held or ``floating``.
+
+    A RobotError if Pinocchio does not read it.
+    """
     try:
-        return pin.buildModelFromXML(urdf)
+        return pin.buildModelFromXML(urdf, *([pin.JointModelFreeFlyer()] if floating else []))
     except (ValueError, RuntimeError) as error:
         raise RobotError(f"{path} is no URDF that Pinocchio reads ({_line(error)})") from None
 
@@ -126,18 +129,14 @@ def check_motion(path: Path, robot: ET.Element) -> None:
                 " fixed, lock it with its leader, or remove its <mimic> if it has a motor"
             )
         for limit in joint.findall("limit") if joint.get("type") in _RANGED else ():
-            missing = [name for name in _ENDS if limit.get(name) is None]
             lower, upper = (float(limit.get(name, "0")) for name in _ENDS)
-            if missing and not lower < upper:
-                raise RobotError(
-                    f"{where}: limit has no {' and no '.join(missing)}: give the range that it can"
-                    " turn in"
-                )
-            if not lower < upper:
-                raise RobotError(
-                    f"{where} has lower {lower:g} and upper {upper:g}: give a range that it can"
-                    " turn in"
-                )
+            if lower < upper:
+                continue
+            missing = " and no ".join(name for name in _ENDS if limit.get(name) is None)
+            wrong = f" has lower {lower:g} and upper {upper:g}: give a"
+            if missing:
+                wrong = f": limit has no {missing}: give the"
+            raise RobotError(f"{where}{wrong} range that it can turn in")
 
 
 def mass_of(link: ET.Element) -> float:
@@ -283,13 +282,12 @@ def _check_origin(where: str, element: ET.Element) -> None:
 
 def _check_inertial(path: Path, link: ET.Element) -> None:
     where = f"{path}: link {link.get('name')!r}"
-    for part in ("visual", "collision"):
-        for element in link.findall(part):
-            _check_origin(f"{where}: {part}", element)
     inertial = link.find("inertial")
+    for part in (*link.findall("visual"), *link.findall("collision"), inertial):
+        if part is not None:
+            _check_origin(f"{where}: {part.tag}", part)
     if inertial is None:
         return
-    _check_origin(f"{where}: inertial", inertial)
     mass, inertia = inertial.find("mass"), inertial.find("inertia")
     if mass is None or inertia is None:
         raise RobotError(f"{where}: <inertial> lacks <mass> or <inertia>: give both")

@@ -80,10 +80,10 @@ def lock(
     places: dict[str, float] = dict(locked)
 
     def place(name: str) -> float:
-        mimic = joints[name].find("mimic")
-        if name not in places and mimic is None:
-            places[name] = 0.0
-        elif name not in places and mimic is not None:
+        if name in places:
+            return places[name]
+        mimic, places[name] = joints[name].find("mimic"), 0.0  # also of one that mimics itself
+        if mimic is not None:
             leader = str(mimic.get("joint"))
             if leader in moving or leader not in joints:
                 state = "moves" if leader in moving else "is not there"
@@ -91,7 +91,6 @@ def lock(
                     f"{path}: joint {name!r} mimics joint {leader!r}, which {state}: name"
                     f" {name!r} among the locked joints"
                 )
-            places[name] = 0.0  # of a joint that mimics itself
             multiplier = float(mimic.get("multiplier", "1"))
             places[name] = multiplier * place(leader) + float(mimic.get("offset", "0"))
         return places[name]

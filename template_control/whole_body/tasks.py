@@ -399,9 +399,8 @@ class FrameTask:
             velocity: (3,) of the target [m/s]; None: it rests.
             acceleration: (3,) of the target [m/s^2]; None: 0.
         """
-        rest = np.zeros(3)
-        moving = rest if velocity is None else velocity
-        self._target = np.stack([position, moving, rest if acceleration is None else acceleration])
+        rates = (np.zeros(3) if rate is None else rate for rate in (velocity, acceleration))
+        self._target = np.stack([position, *rates])
 
     def write(self, robot: Robot, references: Any, rows: Rows) -> None:
         """See :meth:`~.task.Task.write`; a ParameterError before :meth:`set_target`."""
