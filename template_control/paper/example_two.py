@@ -216,9 +216,12 @@ def sections(gait: WalkingGait, z: Array) -> Array:
 
 
 def robot_walk(
-    planner: str, plant: str, steps: int = STEPS, beta: float | None = None
+    planner: str, plant: str, steps: int = STEPS, beta: float | None = None, settled: bool = False
 ) -> tuple[Walk, Record]:
-    """Walk and record from z_0; ``beta`` [rad] is a predefined liftoff direction, or None."""
+    """Walk and record from z_0, or ``settled`` on the gait.
+
+    ``beta`` [rad] is a predefined liftoff direction, or None.
+    """
     gait = _gait()
     world, tuning = PLANTS[plant]
     record = simulate(
@@ -228,7 +231,7 @@ def robot_walk(
             steps=steps,
             world=world,
             controller=replace(tuning, guards=GuardOptions(liftoff_angle=beta)),
-            start=start_state(gait),
+            start=None if settled else start_state(gait),
         )
     )
     return Walk(sections(gait, record.section_state), record.fall_reason), record
@@ -250,7 +253,7 @@ def template_walk(planner: str, steps: int = STEPS) -> Walk:
     return Walk(sections(gait, np.array(states)), fall)
 
 
-def _walk(case: tuple[str, str], steps: int = STEPS) -> Walk:
+def _walk(case: tuple[str, str], steps: int) -> Walk:
     planner, plant = case
     return template_walk(planner, steps) if plant == ALONE else robot_walk(planner, plant, steps)[0]
 
@@ -331,21 +334,11 @@ def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Repr
     )
 
 
-def _liftoffs(
-    case: tuple[str, str], steps: int = _LIFTOFF_STEPS
-) -> tuple[Liftoff, Record, Walk, Record]:
+def _liftoffs(case: tuple[str, str], steps: int) -> tuple[Liftoff, Record, Walk, Record]:
     """One step from the equilibrium with a liftoff rule on a plant; and the walk from z_0."""
     rule, plant = case
-    gait, beta = _gait(), _LIFTOFFS[rule]
-    record = simulate(
-        Experiment(
-            load_robot("five-link"),
-            planner=LqrPlanner(gait),
-            steps=2,
-            world=PLANTS[plant][0],
-            controller=EmbeddingOptions(guards=GuardOptions(liftoff_angle=beta)),
-        )
-    )
+    beta = _LIFTOFFS[rule]
+    _, record = robot_walk("LQR", plant, 2, beta, settled=True)
     return liftoff(record), record, *robot_walk("LQR", plant, steps, beta)
 
 

@@ -50,7 +50,6 @@ class Controls:
     ) -> None:
         self._gui, self._ranges, self._do = gui, ranges, do
         self._first_push, self._friction = impulse, friction
-        self.status = gui.add_markdown("")
         with gui.add_folder("Walk"):
             self._add_walk()
         with gui.add_folder("Push"):

@@ -71,7 +71,7 @@ def stances(record: Record) -> list[list[tuple[int, int]]]:
     """For each foot the first sample of each of its stances, and the one after the last."""
     found = []
     for on in carrying(record).T:
-        edges = np.flatnonzero(np.diff(np.concatenate(([False], on, [False])).astype(np.int8)))
+        edges = np.flatnonzero(np.diff(on.astype(np.int8), prepend=0, append=0))
         pairs = edges.reshape(-1, 2).tolist()
         found.append([(a, b) for a, b in pairs if record.time[b - 1] - record.time[a] >= _STANCE])
     return found
