@@ -211,12 +211,7 @@ GAIT = (
     ),
     Flag("--speed", "motion.speed", type=number(SPEED)),
     Flag("--touchdown-angle", "motion.touchdown_angle", type=number(Range(1.0, 89.0))),
-    Flag(
-        "--apex",
-        "motion.apex_height",
-        "of a run, height of the apex; one that suits the speed if not given",
-        number(Range(0.01, 10.0)),
-    ),
+    Flag("--apex", "motion.apex_height", type=number(Range(0.01, 10.0))),
 )
 STANDS = (
     Flag("--from-stand", "motion.from_stand"),
@@ -365,12 +360,7 @@ COURSE = (
         argument={**_MANY, "metavar": "RATE[@TIME]"},
         read=_turns,
     ),
-    Flag(
-        "--side-speed",
-        "course.side_speed",
-        "speed of a floating-base robot to the left",
-        number(Range(-5.0, 5.0)),
-    ),
+    Flag("--side-speed", "course.side_speed", type=number(Range(-5.0, 5.0))),
     Flag(
         "--step-width",
         "course.step_width",
