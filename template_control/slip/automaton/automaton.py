@@ -23,46 +23,14 @@ from template_control.slip.automaton.vocabulary import (
     StrideKind,
 )
 
-SINGLE_STANCE_FAILURES = (
-    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-    Edge(Event.FALL, Outcome.FALL),
-    Edge(Event.BACKWARD, Outcome.BACKWARD),
-)
-"""Of a single stance that goes to VLO or stands on one leg."""
-
-AWAITING_TOUCHDOWN_FAILURES = (
-    Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-    Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
-    Edge(Event.BACKWARD, Outcome.BACKWARD),
-)
-"""Of a single stance whose front leg is to touch down."""
-
-DOUBLE_STANCE_FAILURES = (
-    Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-    Edge(Event.PASSED_FRONT_FOOT, Outcome.NO_LIFTOFF),
-    Edge(Event.FALL, Outcome.FALL),
-    Edge(Event.BACKWARD, Outcome.BACKWARD),
-)
-"""Of a double stance on springs."""
-
-RUNNING_STANCE_FAILURES = (
-    Edge(Event.FALL, Outcome.FALL),
-    Edge(Event.BACKWARD, Outcome.BACKWARD),
-)
-"""Of a stance that a flight follows: its liftoff is wanted."""
-
-HOPPING_STANCE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
-"""Of a run's stance that may go either way, and turn back."""
-
-CURVE_FAILURES = (Edge(Event.FALL, Outcome.FALL),)
-"""Of a double stance that follows a curve in time."""
-
-FLIGHT_FAILURES = (Edge(Event.FALL, Outcome.NO_TOUCHDOWN),)
-"""Of a flight: it ends at the ground."""
+_UNWANTED_FLIGHT = Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT)
+_NO_TOUCHDOWN = Edge(Event.FALL, Outcome.NO_TOUCHDOWN)  # of a foot that was to land
+_FALL = Edge(Event.FALL, Outcome.FALL)
+_STANCE_FAILURES = (_FALL, Edge(Event.BACKWARD, Outcome.BACKWARD))
 
 
 def _flight(name: str, *edges: Edge) -> Node:
-    return Node(name, Phase.F, None, None, (*edges, *FLIGHT_FAILURES))
+    return Node(name, Phase.F, None, None, (*edges, _NO_TOUCHDOWN))
 
 
 def _single(name: str, leg: Slot, *edges: Edge) -> Node:
@@ -70,12 +38,60 @@ def _single(name: str, leg: Slot, *edges: Edge) -> Node:
 
 
 def _double(name: str, rear: Slot, front: Slot, *edges: Edge) -> Node:
-    return Node(name, Phase.DS, rear, front, (*edges, *DOUBLE_STANCE_FAILURES))
+    failures = (
+        Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+        Edge(Event.PASSED_FRONT_FOOT, Outcome.NO_LIFTOFF),
+        *_STANCE_FAILURES,
+    )
+    return Node(name, Phase.DS, rear, front, (*edges, *failures))
 
 
 def _curve(name: str, *edges: Edge) -> Node:
-    """A double stance that no springs carry."""
-    return Node(name, Phase.DS, None, None, (*edges, *CURVE_FAILURES))
+    """A double stance that no springs carry: it follows a curve in time."""
+    return Node(name, Phase.DS, None, None, (*edges, _FALL))
+
+
+def _awaiting(gait: str, target: str, early: Edge = _UNWANTED_FLIGHT) -> Node:
+    """A walker's single stance from VLO on; ``early`` is its liftoff before the touchdown."""
+    guard = f"G_t^{gait.removesuffix('*')}"
+    return _single(
+        f"SS_av^{gait}",
+        Slot.K_SC,
+        Edge(Event.TOUCHDOWN, target, Reset.PLACE_FRONT, guard),
+        early,
+        _NO_TOUCHDOWN,
+        *_STANCE_FAILURES[1:],
+    )
+
+
+def _until_liftoff(
+    gait: str, rear: tuple[Slot, Slot], front: Slot, lifts: Edge
+) -> tuple[Node, Node]:
+    """Double stance -> virtual bottom -> rear liftoff.
+
+    ``rear`` are slots of the rear leg's stiffness before and after the bottom, ``front`` that of
+    the front leg after it.
+    """
+    bottom = Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}")
+    # The paper assumes a virtual bottom in every double stance; a short one of a
+    # disturbed walker ends without.
+    return (
+        _double(f"DS_sc^{gait}", rear[0], Slot.K_SC, bottom, lifts),
+        _double(f"DS_sd^{gait}", rear[1], front, lifts),
+    )
+
+
+def _until_bottom(gait: str, failures: tuple[Edge, ...]) -> tuple[Node, Node]:
+    """Apex -> touchdown -> bottom; ``failures`` are those of the stance."""
+    lands = Edge(Event.TOUCHDOWN, f"SS_sc^{gait}", Reset.PLACE_REAR, f"G_t^{gait}")
+    bottom = Edge(Event.BOTTOM, f"SS_sd^{gait}", Reset.NONE, f"G_b^{gait}")
+    return _flight(f"F_aa^{gait}", lands), _single(f"SS_sc^{gait}", Slot.K_SC, bottom, *failures)
+
+
+def _to_vlo(name: str, target: str, guard: str) -> Node:
+    """A single stance -> VLO."""
+    section = Edge(Event.VLO, target, Reset.NONE, guard, section=True)
+    return _single(name, Slot.K_SD, section, _UNWANTED_FLIGHT, *_STANCE_FAILURES)
 
 
 def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
@@ -85,91 +101,36 @@ def walking(gait: str, rear: tuple[Slot, Slot]) -> tuple[Node, ...]:
     """
     lifts = Edge(Event.REAR_LIFTOFF, f"SS_bv^{gait}", Reset.SHIFT, f"G_l^{gait}")
     return (
-        _single(
-            f"SS_av^{gait}",
-            Slot.K_SC,
-            Edge(Event.TOUCHDOWN, f"DS_sc^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
-            *AWAITING_TOUCHDOWN_FAILURES,
-        ),
-        _double(
-            f"DS_sc^{gait}",
-            rear[0],
-            Slot.K_SC,
-            Edge(Event.VIRTUAL_BOTTOM, f"DS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
-            # The paper assumes a virtual bottom in every double stance; a short one of a
-            # disturbed walker ends without.
-            lifts,
-        ),
-        _double(f"DS_sd^{gait}", rear[1], Slot.K_SD, lifts),
-        _single(
-            f"SS_bv^{gait}",
-            Slot.K_SD,
-            Edge(Event.VLO, f"SS_av^{gait}", Reset.NONE, f"G_v^{gait}", section=True),
-            *SINGLE_STANCE_FAILURES,
-        ),
+        _awaiting(gait, f"DS_sc^{gait}"),
+        *_until_liftoff(gait, rear, Slot.K_SD, lifts),
+        _to_vlo(f"SS_bv^{gait}", f"SS_av^{gait}", f"G_v^{gait}"),
     )
 
 
 def running(gait: str, failures: tuple[Edge, ...]) -> tuple[Node, ...]:
     """Apex -> touchdown -> bottom -> liftoff -> apex; ``failures`` are those of its stances."""
+    lifts = Edge(Event.REAR_LIFTOFF, f"F_ba^{gait}", Reset.SWAP, f"G_l^{gait}")
+    apex = Edge(Event.APEX, f"F_aa^{gait}", Reset.NONE, f"G_a^{gait}", section=True)
     return (
-        _flight(
-            f"F_aa^{gait}",
-            Edge(Event.TOUCHDOWN, f"SS_sc^{gait}", Reset.PLACE_REAR, f"G_t^{gait}"),
-        ),
-        _single(
-            f"SS_sc^{gait}",
-            Slot.K_SC,
-            Edge(Event.BOTTOM, f"SS_sd^{gait}", Reset.NONE, f"G_b^{gait}"),
-            *failures,
-        ),
-        _single(
-            f"SS_sd^{gait}",
-            Slot.K_SD,
-            Edge(Event.REAR_LIFTOFF, f"F_ba^{gait}", Reset.SWAP, f"G_l^{gait}"),
-            *failures,
-        ),
-        _flight(
-            f"F_ba^{gait}",
-            Edge(Event.APEX, f"F_aa^{gait}", Reset.NONE, f"G_a^{gait}", section=True),
-        ),
+        *_until_bottom(gait, failures),
+        _single(f"SS_sd^{gait}", Slot.K_SD, lifts, *failures),
+        _flight(f"F_ba^{gait}", apex),
     )
 
 
 def walk_to_run() -> tuple[Node, ...]:
     """The WRT stride: the rear leg walks, the front leg runs (Section IV-C1)."""
     lifts = Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr")
+    # A walker that is too fast takes off before.
+    takes_off = Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr")
+    bottom = Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr")
+    flies = Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr")
     return (
-        _single(
-            "SS_av^wr",
-            Slot.K_SC,
-            Edge(Event.TOUCHDOWN, "DS_sc^wr", Reset.PLACE_FRONT, "G_t^wr"),
-            # A walker that is too fast takes off before.
-            Edge(Event.REAR_LIFTOFF, "F_aa^wr", Reset.SWAP, "G_l^wr"),
-            *AWAITING_TOUCHDOWN_FAILURES[1:],
-        ),
+        _awaiting("wr", "DS_sc^wr", takes_off),
         _flight("F_aa^wr", Edge(Event.TOUCHDOWN, "SS_sc^wr", Reset.PLACE_REAR, "G_t^wr")),
-        _double(
-            "DS_sc^wr",
-            Slot.K_SC,
-            Slot.K_SC,
-            Edge(Event.VIRTUAL_BOTTOM, "DS_sd^wr", Reset.NONE, "G_b^wr"),
-            lifts,
-        ),
-        _double("DS_sd^wr", Slot.K_SD, Slot.K_SC_WR, lifts),
-        _single(
-            "SS_sc^wr",
-            Slot.K_SC_WR,
-            Edge(Event.BOTTOM, "SS_sd^wr", Reset.NONE, "G_b^wr"),
-            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-            *RUNNING_STANCE_FAILURES,
-        ),
-        _single(
-            "SS_sd^wr",
-            Slot.K_SD_WR,
-            Edge(Event.REAR_LIFTOFF, "F_ba^wr", Reset.SWAP, "G_f^wr"),
-            *RUNNING_STANCE_FAILURES,
-        ),
+        *_until_liftoff("wr", (Slot.K_SC, Slot.K_SD), Slot.K_SC_WR, lifts),
+        _single("SS_sc^wr", Slot.K_SC_WR, bottom, _UNWANTED_FLIGHT, *_STANCE_FAILURES),
+        _single("SS_sd^wr", Slot.K_SD_WR, flies, *_STANCE_FAILURES),
         _flight("F_ba^wr", Edge(Event.APEX, "F_aa^r", Reset.NONE, "G_a^r", section=True)),
     )
 
@@ -180,51 +141,17 @@ def simplified_walk_to_run() -> tuple[Node, ...]:
     The rear leg is ignored after the virtual bottom, though its liftoff still ends the
     phase; from there on the stride is the real one.
     """
-    return (
-        _single(
-            "SS_av^wr*",
-            Slot.K_SC,
-            Edge(Event.TOUCHDOWN, "DS_sc^wr*", Reset.PLACE_FRONT, "G_t^wr"),
-            *AWAITING_TOUCHDOWN_FAILURES,
-        ),
-        _double(
-            "DS_sc^wr*",
-            Slot.K_SC,
-            Slot.K_SC,
-            Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr"),
-            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-        ),
-        Node(
-            "SS_br^wr*",
-            Phase.SS,
-            None,
-            Slot.K_SC_WR,
-            (
-                Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
-                # Alone, the front leg may be passed before: that is no failure here.
-                Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-                *RUNNING_STANCE_FAILURES,
-            ),
-        ),
+    bottom = Edge(Event.VIRTUAL_BOTTOM, "SS_br^wr*", Reset.NONE, "G_b^wr")
+    alone = (
+        Edge(Event.REAR_LIFTOFF, "SS_sc^wr", Reset.SHIFT, "G_r^wr"),
+        # Alone, the front leg may be passed before: that is no failure here.
+        Edge(Event.FRONT_LIFTOFF, Outcome.UNWANTED_FLIGHT),
+        *_STANCE_FAILURES,
     )
-
-
-def run_to_walk() -> tuple[Node, ...]:
-    """The RWT stride: apex -> touchdown -> bottom -> VLO (Section IV-C2)."""
     return (
-        _flight("F_aa^rw", Edge(Event.TOUCHDOWN, "SS_sc^rw", Reset.PLACE_REAR, "G_t^rw")),
-        _single(
-            "SS_sc^rw",
-            Slot.K_SC,
-            Edge(Event.BOTTOM, "SS_sd^rw", Reset.NONE, "G_b^rw"),
-            *RUNNING_STANCE_FAILURES,
-        ),
-        _single(
-            "SS_sd^rw",
-            Slot.K_SD,
-            Edge(Event.VLO, "SS_av^w", Reset.NONE, "G_v^rw", section=True),
-            *SINGLE_STANCE_FAILURES,
-        ),
+        _awaiting("wr*", "DS_sc^wr*"),
+        _double("DS_sc^wr*", Slot.K_SC, Slot.K_SC, bottom, _UNWANTED_FLIGHT),
+        Node("SS_br^wr*", Phase.SS, None, Slot.K_SC_WR, alone),
     )
 
 
@@ -234,64 +161,43 @@ def standing() -> tuple[Node, ...]:
     No springs carry their double stances: the CoM follows a curve in time there. The template's
     own simulator falls through them.
     """
-
-    def last(gait: str, target: str) -> Node:
-        """A walker's single stance, of which a curve is the next node."""
-        lands = Edge(Event.TOUCHDOWN, target, Reset.PLACE_FRONT, f"G_t^{gait}")
-        return _single(f"SS_av^{gait}", Slot.K_SC, lands, *AWAITING_TOUCHDOWN_FAILURES)
-
     return (
         _curve("DS_ar^s", Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^s", section=True)),
         _curve("DS_ar^sw", Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^sw")),
-        last("ws", "DS_br^ws"),
+        _awaiting("ws", "DS_br^ws"),
         _curve("DS_br^ws", Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^ws", section=True)),
-        last("ww", "DS_bl^ww"),
+        _awaiting("ww", "DS_bl^ww"),
         _curve("DS_bl^ww", Edge(Event.REAR_LIFTOFF, "SS_bv^w", Reset.SHIFT, "G_l^ww")),
     )
 
 
-def _stepping(gait: str, lifts: Edge, rests: Edge) -> tuple[Node, ...]:
-    """From a stand, over one leg, to a stand; ``lifts`` and ``rests`` begin and end it."""
+def stepping(gait: str, lifts: Event, lifted: Reset, rested: Reset) -> tuple[Node, ...]:
+    """From a stand, over one leg, to a stand; ``lifts`` begins it, and its two resets."""
+    lands = Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}")
+    rests = Edge(Event.REST, "DS_ar^s", rested, f"G_r^{gait}", section=True)
     return (
-        _curve(f"DS_al^{gait}", lifts),
-        _single(
-            f"SS_bt^{gait}",
-            Slot.K_SC,
-            Edge(Event.TOUCHDOWN, f"DS_br^{gait}", Reset.PLACE_FRONT, f"G_t^{gait}"),
-            Edge(Event.REAR_LIFTOFF, Outcome.UNWANTED_FLIGHT),
-            Edge(Event.FALL, Outcome.NO_TOUCHDOWN),
-        ),
+        _curve(f"DS_al^{gait}", Edge(lifts, f"SS_bt^{gait}", lifted, f"G_l^{gait}")),
+        _single(f"SS_bt^{gait}", Slot.K_SC, lands, _UNWANTED_FLIGHT, _NO_TOUCHDOWN),
         _curve(f"DS_br^{gait}", rests),
-    )
-
-
-def steps_from_a_stand() -> tuple[Node, ...]:
-    """A step forward, and one back, whose foot lands behind the other: then they change roles."""
-    return (
-        *_stepping(
-            StrideKind.STEP_FORWARD,
-            Edge(Event.REAR_LIFTOFF, "SS_bt^sf", Reset.SHIFT, "G_l^sf"),
-            Edge(Event.REST, "DS_ar^s", Reset.NONE, "G_r^sf", section=True),
-        ),
-        *_stepping(
-            StrideKind.STEP_BACK,
-            Edge(Event.FRONT_LIFTOFF, "SS_bt^sb", Reset.NONE, "G_l^sb"),
-            Edge(Event.REST, "DS_ar^s", Reset.SWAP, "G_r^sb", section=True),
-        ),
     )
 
 
 AUTOMATON = Automaton(
     nodes=(
         *walking(StrideKind.WALK, (Slot.K_SC, Slot.K_SD)),
-        *running(StrideKind.RUN, RUNNING_STANCE_FAILURES),
+        *running(StrideKind.RUN, _STANCE_FAILURES),
         *walk_to_run(),
-        *run_to_walk(),
+        # The RWT stride (Section IV-C2).
+        *_until_bottom(StrideKind.RUN_TO_WALK, _STANCE_FAILURES),
+        _to_vlo("SS_sd^rw", "SS_av^w", "G_v^rw"),
         *simplified_walk_to_run(),
         *standing(),
         *walking(StrideKind.WALK_PUSH_OFF, (Slot.K_PUSH, Slot.K_PUSH)),
-        *steps_from_a_stand(),
-        *running(StrideKind.HOP, HOPPING_STANCE_FAILURES),
+        *stepping(StrideKind.STEP_FORWARD, Event.REAR_LIFTOFF, Reset.SHIFT, Reset.NONE),
+        # Its foot lands behind the other: then they change roles.
+        *stepping(StrideKind.STEP_BACK, Event.FRONT_LIFTOFF, Reset.NONE, Reset.SWAP),
+        # A slow run may go either way, and turn back.
+        *running(StrideKind.HOP, (_FALL,)),
     ),
     starts={
         StrideKind.WALK: "SS_av^w",
@@ -317,14 +223,11 @@ walking with push-off)."""
 
 
 RUN_ON: Mapping[str, str] = {
-    "SS_av^w": "SS_av^wr",
-    "DS_sc^w": "DS_sc^wr",
-    "DS_sd^w": "DS_sd^wr",
-    "SS_bv^w": "SS_av^wr",
-    "SS_av^wp": "SS_av^wr",
-    "DS_sc^wp": "DS_sc^wr",
-    "DS_sd^wp": "DS_sd^wr",
-    "SS_bv^wp": "SS_av^wr",
+    f"{node}^{gait}": f"{start}^wr"
+    for gait in (StrideKind.WALK, StrideKind.WALK_PUSH_OFF)
+    for node, start in zip(
+        ("SS_av", "DS_sc", "DS_sd", "SS_bv"), ("SS_av", "DS_sc", "DS_sd", "SS_av"), strict=True
+    )
 }
 """By a walking node: where the walk-to-run stride goes on from there.
 
