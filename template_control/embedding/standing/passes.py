@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ from template_control.embedding.standing.supports import OverFeet
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
-from template_control.slip.gaits.gait import Gait
+from template_control.slip.gaits.gait import GaitsBySpeed
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
@@ -51,13 +51,6 @@ _STEP_SPEEDS = 10  # at VLO that are tried
 _FASTEST = 0.16  # of them, over sqrt(g l0)
 _LATE = 0.15  # the foot lifts off this long after VLO at the latest [s], for the reference template
 _SPARE = 0.06  # distance of the capture point from either foot at landing, over l0
-
-
-class GaitsBySpeed(NamedTuple):
-    """Walking gaits by their speed at VLO, and the slowest and the fastest speed [m/s]."""
-
-    gait: Callable[[float], Gait]
-    speeds: tuple[float, float]
 
 
 class SingleSupportPass(NamedTuple):
@@ -126,11 +119,6 @@ class PassTable:
         first = float(np.clip(wanted, self._speeds[0], self._speeds[-1]))
         return [first, *sorted(inside, key=lambda v: abs(v - wanted))]
 
-    def nearest(self, speed: float) -> Gait:
-        """The gait whose speed at VLO is nearest to another one [m/s]."""
-        slowest, fastest = self.family.speeds
-        return self.family.gait(min(max(speed, slowest), fastest))
-
     def at(self, speed: float) -> SingleSupportPass:
         """The pass with a speed at VLO [m/s]."""
         if speed not in self._known:
@@ -140,7 +128,7 @@ class PassTable:
     def _made(self, speed: float) -> SingleSupportPass:
         p, slowest = self.parameters, self.family.speeds[0]
         if speed >= slowest:
-            gait = self.nearest(speed)
+            gait = self.family.nearest(speed)
             return SingleSupportPass(gait.state, float(gait.controls[Slot.K_SD]))
         own = float(self.family.gait(slowest).controls[Slot.K_SD])
         stiff = _SLOW_STIFFNESS * p.mass * p.gravity / p.rest_length

@@ -8,7 +8,6 @@ one forward: all is planned forward, and turned round.
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +26,6 @@ from template_control.embedding.standing.curves import (
 from template_control.embedding.standing.passes import (
     NIMBLE,
     STEP_DURATION,
-    GaitsBySpeed,
     LandingTable,
     PassTable,
     SingleSupportPass,
@@ -40,8 +38,8 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
 from template_control.slip.dynamics.timed import TERMS, Quintic, chained, timed_stride
-from template_control.slip.gaits.gait import Gait
-from template_control.slip.gaits.walking_by_speed import speed_range, walking_by_speed, walking_gait
+from template_control.slip.gaits.gait import Gait, GaitsBySpeed
+from template_control.slip.gaits.walking_by_speed import paper_walks, walking_by_speed
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 
@@ -125,7 +123,7 @@ class CurvePlanner(Planner):
 
     def next_gait(self) -> Gait | None:
         """See :meth:`~.planner.Planner.next_gait`."""
-        return None if self._rests else self._passes.nearest(self._speed)
+        return None if self._rests else self._passes.family.nearest(self._speed)
 
     def decide_rest(self, context: RestContext) -> Decision | None:
         """See :meth:`~.planner.Planner.decide_rest`."""
@@ -415,10 +413,7 @@ def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
     Args:
         parameters: the template.
     """
-    chain = walking_by_speed().chains[-1]
-    unit = parameters.speed_unit
-    ends = (float(chain.vlo_speed[0]) * unit, float(chain.vlo_speed[-1]) * unit)
-    return GaitsBySpeed(partial(chain.gait, parameters), ends)
+    return walking_by_speed().chains[-1].gaits(parameters)
 
 
 def recovery_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
@@ -450,7 +445,7 @@ def standing_planners(
         family: the gaits that a walk may have, such as :func:`gaits_by_speed`; None: the library's
             own.
     """
-    gaits = family or GaitsBySpeed(partial(walking_gait, parameters), speed_range(parameters))
+    gaits = family or paper_walks(parameters)
     o = scaled(options or StandingOptions(), Scale.of(parameters))
     passes = PassTable(parameters, o, gaits)
     forward = StepPlanner(passes, StrideKind.STEP_FORWARD)

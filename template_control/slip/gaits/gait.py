@@ -5,11 +5,11 @@ On a slope, what the climb takes, the legs give in double stance.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
-from typing import Annotated, Generic, TypeVar
+from typing import Annotated, Generic, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -40,9 +40,11 @@ WALKING_SLOTS: dict[str, tuple[Slot, ...]] = {
 }
 """Controls of each kind of walking step: alpha, kappa_1, kappa_2 and, with push-off, kappa_p."""
 
-_ANGLES = np.arange(60.0, 77.5, 0.5).tolist()  # [deg] where gaits are looked for
-_SPEEDS = np.linspace(0.2, 0.45, 26).tolist()  # at VLO, over sqrt(g l0)
+SPEEDS = np.linspace(0.2, 0.45, 26)
+"""Speeds at VLO where gaits of one stiffness are looked for, over sqrt(g l0)."""
+_ANGLES = np.arange(60.0, 77.5, 0.5).tolist()  # [deg] the same
 _SCAN = 120
+_CLIMBS, _RISES = 1, 2  # of a VLO state: y, dy/dt
 
 
 @dataclass(frozen=True)
@@ -108,18 +110,19 @@ def with_push_off(gait: WalkingGait) -> WalkingGait:
 
     In a passive gait that is k0, as every other leg's: the motion is the same.
     """
-    u = gait.controls.copy()
-    u[Slot.K_PUSH] = u[Slot.K_SC]
-    return replace(gait, controls=u, stride=StrideKind.WALK_PUSH_OFF)
+    return _pushing(gait, StrideKind.WALK_PUSH_OFF, gait.controls[Slot.K_SC])
 
 
 def without_push_off(gait: WalkingGait) -> WalkingGait:
     """The same gait in the steps of the paper; itself, if it is in these."""
-    if gait.stride != StrideKind.WALK_PUSH_OFF:
-        return gait
+    pushes = gait.stride == StrideKind.WALK_PUSH_OFF
+    return _pushing(gait, StrideKind.WALK, 0.0) if pushes else gait
+
+
+def _pushing(gait: WalkingGait, stride: WalkingStride, stiffness: float) -> WalkingGait:
     u = gait.controls.copy()
-    u[Slot.K_PUSH] = 0.0
-    return replace(gait, controls=u, stride=StrideKind.WALK)
+    u[Slot.K_PUSH] = stiffness
+    return replace(gait, controls=u, stride=stride)
 
 
 def _kind(gait: Gait) -> str:
@@ -150,27 +153,23 @@ def uncontrolled(gait: Gait) -> Array:
 
 def _gait(parameters: SlipParameters, z: Array, u: Array, name: str = "walk") -> WalkingGait:
     stride = simulate_stride(parameters, STRIDE_START[StrideKind.WALK], VLO.state(z), u)
-    if not stride.completed or np.max(np.abs(VLO.of(stride.state) - z)) > 1e-6:
-        raise GaitError(f"gait {name!r} does not return to its VLO state: {stride.outcome.reason}")
     return WalkingGait(name, parameters, z, u, float(stride.state[0]), stride.duration)
 
 
-def _misses(step: ReturnMap, z: Array, u: Array) -> tuple[float, float]:
-    """dy/dt at the next VLO and the change of y to it [m/s, m]; NaN where there is no next."""
-    z_next, outcome = step.step(z, u)
-    if outcome is not Outcome.SECTION:
-        return np.nan, np.nan
-    return float(z_next[2]), float(z_next[1] - z[1])
+def roots(function: Callable[[float], float], grid: Array, **tolerances: float) -> Iterator[float]:
+    """Zeros of a function on a grid, in its order: one between neighbours of different signs.
 
-
-def root(
-    function: Callable[[float], float], ends: tuple[float, float], xtol: float, rtol: float
-) -> float | None:
-    """Zero of a function of different signs at two ends; None if it is NaN somewhere between."""
-    try:
-        return float(brentq(function, *ends, xtol=xtol, rtol=rtol))
-    except ValueError:
-        return None
+    None where the function is NaN at one of the two, or somewhere between. ``tolerances`` are those
+    of :func:`scipy.optimize.brentq`.
+    """
+    values = map(function, grid.tolist())
+    for ends, (first, last) in zip(pairwise(grid.tolist()), pairwise(values), strict=True):
+        if first * last <= 0.0:
+            try:
+                zero = brentq(function, *sorted(ends), **tolerances)
+            except ValueError:
+                continue
+            yield float(zero)
 
 
 def _symmetric_roots(
@@ -186,24 +185,20 @@ def _symmetric_roots(
     """
     step = ReturnMap(parameters)
 
-    def miss(which: int, value: float) -> float:
-        return _misses(step, *make(value))[which]
+    @cache
+    def change(value: float) -> Array:
+        """Of z in a step; NaN where there is no next VLO."""
+        z, u = make(value)
+        z_next, outcome = step.step(z, u)
+        return z_next - z if outcome is Outcome.SECTION else np.full_like(z, np.nan)
 
-    samples = np.array([_misses(step, *make(v)) for v in values])
-    for which in range(2):
-        found = []
-        misses = samples[:, which]
-        for ends, (f_lo, f_hi) in zip(pairwise(values), pairwise(misses), strict=True):
-            if not (np.isfinite(f_lo) and np.isfinite(f_hi)) or f_lo * f_hi > 0.0:
-                continue
-            value = root(partial(miss, which), ends, 1e-14, 1e-14)
-            if value is None:
-                continue
-            z, u = make(value)
-            z_next, outcome = step.step(z, u)
-            # A vertical speed that returns to zero need not be the symmetric step.
-            if outcome is Outcome.SECTION and np.max(np.abs(z_next - z)) < 1e-6:
-                found.append((z, u))
+    def miss(which: int, value: float) -> float:
+        return float(change(value)[which])
+
+    for which in (_RISES, _CLIMBS):
+        zeros = roots(partial(miss, which), values, xtol=1e-14, rtol=1e-14)
+        # A vertical speed that returns to zero need not be the symmetric step.
+        found = [make(value) for value in zeros if np.max(np.abs(change(value))) < 1e-6]
         if found:
             return found
     return []
@@ -250,7 +245,7 @@ def _nearest(parameters: SlipParameters, touchdown_angle: float, vlo_speed: floa
     for angle in sorted(_ANGLES, key=lambda angle: abs(angle - wanted)):
         if find_gait_at(parameters, np.radians(angle), vlo_speed):
             return f"at this speed the nearest angle is {angle:g} deg"
-    speeds = (float(f"{parameters.speed_unit * speed:.3g}") for speed in _SPEEDS)
+    speeds = (float(f"{parameters.speed_unit * speed:.3g}") for speed in SPEEDS.tolist())
     for speed in sorted(speeds, key=lambda speed: abs(speed - vlo_speed)):
         if find_gait_at(parameters, touchdown_angle, speed):
             return f"at this angle the nearest speed is {speed:g} m/s"
@@ -316,13 +311,19 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
     weights = np.append(weights, [_STIFFNESS] * (len(slots) - 1))
     weights = np.append(weights, _ASSIST / p.gravity**2)
     wanted = np.concatenate((gait.vlo[1:], gait.controls[slots] / units, [p.assist]))
+    change = _DIFFERENCE * p.gravity
+
+    def unpacked(x: Array) -> tuple[Array, Array, SlipParameters]:
+        """VLO state, controls by Slot and template of the unknowns."""
+        u = gait.controls.copy()
+        u[slots] = x[2:-1] * units
+        return np.array([gait.vlo[0], *x[:2]]), u, replace(p, slope=slope, assist=float(x[-1]))
+
     x = wanted.copy()
     for _ in range(_ROUNDS):
-        z, u, assist = _unpacked(gait, x)
-        own = replace(p, slope=slope, assist=assist)
+        z, u, own = unpacked(x)
         here = ReturnMap(own, gait.stride).linearise(z, u)
-        change = _DIFFERENCE * p.gravity
-        pushed = replace(own, assist=assist + change)
+        pushed = replace(own, assist=own.assist + change)
         there, outcome = ReturnMap(pushed, gait.stride).step(z, u)
         if Outcome.SECTION not in (here.outcome, outcome):
             break
@@ -333,19 +334,20 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
         step = _least_change(weights, wanted - x, slopes, z - here.state)
         x += step
         if np.max(np.abs(step)) < _DONE:
-            return _gait_on_slope(gait, slope, x)
+            z, u, own = unpacked(x)
+            end = simulate_stride(own, STRIDE_START[gait.stride], VLO.state(z), u)
+            return replace(
+                gait,
+                parameters=own,
+                state=z,
+                controls=u,
+                step_length=float(end.state[0]),
+                step_duration=end.duration,
+            )
     raise GaitError(
         f"no walking gait with {gait.vlo[0]:.3g} m/s at VLO on a slope of"
         f" {np.degrees(slope):.3g} deg: take a gentler slope"
     )
-
-
-def _unpacked(gait: WalkingGait, x: Array) -> tuple[Array, Array, float]:
-    """VLO state, controls by Slot and assist of the unknowns ``x``."""
-    slots, units = control_units(gait)
-    u = gait.controls.copy()
-    u[slots] = x[2:-1] * units
-    return np.array([gait.vlo[0], *x[:2]]), u, float(x[-1])
 
 
 def _least_change(weights: Array, wanted: Array, slopes: Array, missing: Array) -> Array:
@@ -356,16 +358,6 @@ def _least_change(weights: Array, wanted: Array, slopes: Array, missing: Array) 
     kkt[:n, n:], kkt[n:, :n] = slopes.T, slopes
     solution = np.linalg.solve(kkt, np.concatenate((weights * wanted, missing)))
     return np.asarray(solution[:n], dtype=np.float64)
-
-
-def _gait_on_slope(gait: WalkingGait, slope: float, x: Array) -> WalkingGait:
-    z, u, assist = _unpacked(gait, x)
-    own = replace(gait.parameters, slope=slope, assist=assist)
-    step = simulate_stride(own, STRIDE_START[gait.stride], VLO.state(z), u)
-    length = float(step.state[0])
-    return replace(
-        gait, parameters=own, state=z, controls=u, step_length=length, step_duration=step.duration
-    )
 
 
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
@@ -380,16 +372,28 @@ def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
 
 
 G = TypeVar("G", bound=Gait)
-Others = Callable[[G], tuple[float, float, Callable[[SlipParameters, float], G]]]
-"""Range of speeds at the section [m/s], and maker, of the gaits that a gait may give way to."""
-
 _SAME = 1e-9  # of sqrt(g l0): speeds that are one
 
 
-class GaitFamily(Generic[G]):
-    """The gaits that a planner's targets stand for: its own, and others with their speeds."""
+class GaitsBySpeed(NamedTuple):
+    """Gaits by their speed at the section, and the slowest and the fastest speed [m/s]."""
 
-    def __init__(self, gait: G, others: Others[G]) -> None:
+    gait: Callable[[float], Gait]
+    speeds: tuple[float, float]
+
+    def nearest(self, speed: float) -> Gait:
+        """The gait whose speed is nearest to another one [m/s]."""
+        slowest, fastest = self.speeds
+        return self.gait(min(max(speed, slowest), fastest))
+
+
+class GaitFamily(Generic[G]):
+    """The gaits that a planner's targets stand for: its own, and others with their speeds.
+
+    ``others`` has those, of its own class, that a gait may give way to.
+    """
+
+    def __init__(self, gait: G, others: Callable[[G], GaitsBySpeed]) -> None:
         self._known, self._others = [gait], others
 
     def reset(self) -> G:
@@ -408,8 +412,6 @@ class GaitFamily(Generic[G]):
         for gait in (present, *self._known):
             if abs(gait.state[0] - wanted) <= same:
                 return gait, True
-        low, high, make = self._others(present)
-        speed = min(max(wanted, low), high)
-        gait = make(present.parameters, speed)
+        gait = cast(G, self._others(present).nearest(wanted))
         self._known.append(gait)
-        return gait, abs(speed - wanted) <= same
+        return gait, bool(abs(gait.state[0] - wanted) <= same)

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import brentq
 
 from template_control.arrays import Array
 from template_control.checks.checked import checked
@@ -18,7 +15,7 @@ from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import Gait
+from template_control.slip.gaits.gait import Gait, GaitsBySpeed, roots
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
@@ -153,15 +150,10 @@ def _symmetric_angle(
     top = np.arcsin(min(z[1] / parameters.rest_length, 1.0))
     top += -_TIP if z[1] < parameters.rest_length else _TIP  # on the spot the leg is vertical
     angles = np.linspace(top, _FLATTEST, _SCAN)
-    above = surplus(angles[0])
-    for steep, flat in pairwise(angles):
-        below = above
-        above = surplus(flat)
-        if below * above <= 0.0:
-            return float(brentq(surplus, flat, steep, xtol=1e-13, rtol=1e-13))
-    return None
+    return next(roots(surplus, angles, xtol=1e-13, rtol=1e-13), None)
 
 
-def other_runs(gait: RunningGait) -> tuple[float, float, Callable[..., RunningGait]]:
-    """See :data:`~.gait.Others`: runs, or hops, with heights and stiffnesses by speed."""
-    return *running_speeds(gait.parameters, gait.stride), partial(running_gait, stride=gait.stride)
+def other_runs(gait: RunningGait) -> GaitsBySpeed:
+    """Runs, or hops, that a gait may give way to, with heights and stiffnesses by speed."""
+    make = partial(running_gait, gait.parameters, stride=gait.stride)
+    return GaitsBySpeed(make, running_speeds(gait.parameters, gait.stride))

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from importlib.resources import files
 
 import numpy as np
@@ -19,7 +18,15 @@ from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.gaits.gait import WalkingGait, find_gait_at, gait_at, root, with_push_off
+from template_control.slip.gaits.gait import (
+    SPEEDS,
+    GaitsBySpeed,
+    WalkingGait,
+    find_gait_at,
+    gait_at,
+    roots,
+    with_push_off,
+)
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
@@ -94,7 +101,7 @@ def _stride(x: Array, vlo_speed: float, weight: float, length: float) -> tuple[A
     return np.array([vlo_speed, x[2] * length, 0.0]), controls(float(x[1]), k, k)
 
 
-_XTOL, _RTOL = 1e-10, 8.881784197001252e-16  # of speeds; scipy's least
+_XTOL = 1e-10  # of speeds
 _ROUNDING = 1e-6  # of a centimetre per second
 
 
@@ -138,7 +145,12 @@ class Chain:
         misses = [surplus(float(end)) for end in ends]
         if misses[0] * misses[1] >= 0.0:  # at a knot, to rounding
             return self.gait(p, float(ends[np.argmin(np.abs(misses))]) * unit)
-        return self.gait(p, float(brentq(surplus, *ends, xtol=_XTOL, rtol=_RTOL)) * unit)
+        return self.gait(p, float(brentq(surplus, *ends, xtol=_XTOL)) * unit)
+
+    def gaits(self, parameters: SlipParameters) -> GaitsBySpeed:
+        """The chain's gaits of a template by their speed at VLO."""
+        slowest, fastest = (float(self.vlo_speed[i]) * parameters.speed_unit for i in (0, -1))
+        return GaitsBySpeed(partial(self.gait, parameters), (slowest, fastest))
 
 
 @dataclass(frozen=True)
@@ -216,13 +228,12 @@ def walking_by_speed() -> SpeedFamily:
 
 def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at VLO of the library's family [m/s]."""
-    chains, unit = walking_by_speed().chains, parameters.speed_unit
-    return float(chains[0].vlo_speed[0]) * unit, float(chains[-1].vlo_speed[-1]) * unit
+    slow, *_, fast = (chain.gaits(parameters).speeds for chain in walking_by_speed().chains)
+    return slow[0], fast[-1]
 
 
 _SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
 _ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
-_PAPER = (StrideKind.WALK,)  # strides
 
 
 def speed_range(parameters: SlipParameters) -> tuple[float, float]:
@@ -256,22 +267,16 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
     return gait_at(parameters, float(angle), vlo_speed)
 
 
-def other_walks(gait: WalkingGait) -> tuple[float, float, Callable[..., WalkingGait]]:
-    """See :data:`~.gait.Others`: with push-off the family's by speed, on the branch of the gait."""
-    if gait.stride in _PAPER:
-        return *speed_range(gait.parameters), walking_gait
-    chain = walking_by_speed().chain_of(gait)
-    unit = gait.parameters.speed_unit
-    return float(chain.vlo_speed[0] * unit), float(chain.vlo_speed[-1] * unit), chain.gait
+def paper_walks(parameters: SlipParameters) -> GaitsBySpeed:
+    """The gaits of :func:`walking_gait`."""
+    return GaitsBySpeed(partial(walking_gait, parameters), speed_range(parameters))
 
 
-_VLO_SPEEDS = np.linspace(0.2, 0.45, 26)  # over sqrt(g l0): where gaits are looked for
-
-
-def _mean_speed(parameters: SlipParameters, touchdown_angle: float, vlo_speed: float) -> float:
-    """Of the gait that :func:`find_gait_at` finds [m/s]; NaN if it finds none."""
-    gait = find_gait_at(parameters, touchdown_angle, vlo_speed)
-    return np.nan if gait is None else gait.mean_speed
+def other_walks(gait: WalkingGait) -> GaitsBySpeed:
+    """Walks that a gait may give way to: with push-off those of the family on its branch."""
+    if gait.stride == StrideKind.WALK:
+        return paper_walks(gait.parameters)
+    return walking_by_speed().chain_of(gait).gaits(gait.parameters)
 
 
 @checked
@@ -298,22 +303,20 @@ def gait_for_speed(
     if touchdown_angle is None:
         return walking_by_speed().gait_for(p, mean_speed)
     angle = touchdown_angle
-    unit = p.speed_unit
 
-    def surplus(vlo_speed: float) -> float:
-        return _mean_speed(p, angle, vlo_speed) - mean_speed
+    @cache
+    def mean(vlo_speed: float) -> float:
+        """Mean speed of the gait with a speed at VLO; NaN if there is none."""
+        gait = find_gait_at(p, angle, vlo_speed)
+        return np.nan if gait is None else gait.mean_speed
 
-    # The mean speed grows with the speed at VLO; find two neighbours around the wanted one.
-    speeds = unit * _VLO_SPEEDS
-    means = np.array([_mean_speed(p, angle, s) for s in speeds])
-    values = means - mean_speed
-    for lo, hi, f_lo, f_hi in zip(speeds, speeds[1:], values, values[1:], strict=False):
-        if f_lo <= 0.0 <= f_hi:
-            speed = root(surplus, (lo, hi), _XTOL, _RTOL)
-            if speed is not None:
-                return gait_at(p, angle, speed)
-    known, hint = means[np.isfinite(means)], "give another angle, or none"
-    if len(known):
+    speeds = p.speed_unit * SPEEDS
+    found = next(roots(lambda speed: mean(speed) - mean_speed, speeds, xtol=_XTOL), None)
+    if found is not None:
+        return gait_at(p, angle, found)
+    means, hint = [mean(speed) for speed in speeds.tolist()], "give another angle, or none"
+    known = [value for value in means if np.isfinite(value)]
+    if known:
         low, high = np.ceil(100.0 * known[0]) / 100.0, np.floor(100.0 * known[-1]) / 100.0
         if not low <= mean_speed <= high:
             hint = f"give one from {low:.2f} to {high:.2f} m/s"

@@ -1,7 +1,5 @@
 """Standing, starting to walk, changing speed and stopping: curves, planners, and the robot."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ from template_control.embedding.com_path import leg_forces
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
-from template_control.embedding.standing.passes import GaitsBySpeed, PassTable
+from template_control.embedding.standing.passes import PassTable
 from template_control.embedding.standing.planners import BEAT, standing_planners
 from template_control.errors import ParameterError, ScenarioError
 from template_control.run.options import Push
@@ -18,7 +16,7 @@ from template_control.slip import Event, Slot, walking_gait
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.dynamics.timed import Quintic, polynomial
-from template_control.slip.gaits.walking_by_speed import speed_range
+from template_control.slip.gaits.walking_by_speed import paper_walks
 from template_control.slip.maps.section import REST, VLO
 from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
@@ -26,7 +24,7 @@ from template_control.slip.scenario.scenario_route import ScenarioRoute
 
 P = tc.SlipParameters()
 OPTIONS = StandingOptions()
-FAMILY = GaitsBySpeed(partial(walking_gait, P), speed_range(P))
+FAMILY = paper_walks(P)
 BODY = np.array([P.mass, P.gravity, 0.0, P.rest_length, 0.0, 0.0])
 STAND, WALK = Segment("stand", duration=1.0), Segment("walk", speed=0.8, duration=2.0)
 
