@@ -77,6 +77,8 @@ class Design:
     # once [rad]; None: it may be steeper.
     margin: float | None = None
     compression: float | None = None  # wanted length of the leg at the bottom [l0]; None: any
+    by_energy: bool = False  # kappa_2 follows from energy, (38)
+    kept: tuple[Slot, ...] = ()  # controls of a guess that the search leaves as they are
 
     def table(self, parameters: SlipParameters) -> Array:
         """(4, f) of a :class:`~.stride_solver.Prior`, whose base each start of the search is."""
@@ -114,21 +116,10 @@ class Controller:
 
     @checked
     def __init__(self, parameters: SlipParameters, kind: MapKind = MapKind.EXACT) -> None:
-        self._search_on(ReturnMap(parameters, self.design.stride, kind))
-
-    def _search_on(self, step: ReturnMap) -> None:
-        """Search on a map."""
-        design, length = self.design, step.parameters.rest_length
-        self._map = step
-        self._energy: Aim | None = None  # by which kappa_2 is chosen, where it is
-        self._compression = [] if design.compression is None else [design.compression * length]
-        self._also = (REAR_BOTTOM,) * len(self._compression)
-        self._slots = [int(slot) for slot in design.free]
-        self._table = design.table(step.parameters)
-        self._grid = design.grid(step.parameters)
-
-    def _prepare(self, target: Array, guess: Array | None) -> None:
-        """What a stride's search depends on besides; arguments as for :meth:`solve`."""
+        self._map = ReturnMap(parameters, self.design.stride, kind)
+        self._slots = [int(slot) for slot in self.design.free]
+        self._table = self.design.table(parameters)
+        self._grid = self.design.grid(parameters)
 
     def solve(
         self,
@@ -146,51 +137,54 @@ class Controller:
         Raises:
             ParameterError: if a state is not finite, or the target is beyond any stride.
         """
-        design, (n, m) = self.design, self._map.dimensions
+        design, p, (n, m) = self.design, self._map.parameters, self._map.dimensions
         start, aim = finite("section state", z, n), finite("target", target, m)
         self._check(aim)
-        self._prepare(aim, guess)
-        aim = np.append(aim, self._compression)
+        stride = whole(self._map, start, () if design.compression is None else (REAR_BOTTOM,))
+        if design.by_energy:
+            stride = stride._replace(energy=Aim(aim, _KAPPA_2 * p.leg_stiffness))
+        if design.compression is not None:
+            aim = np.append(aim, design.compression * p.rest_length)
         table = self._table.copy()
         if design.margin is not None:
-            top = np.arcsin(min(start[1] / self._map.parameters.rest_length, 1.0)) - design.margin
+            top = np.arcsin(min(start[1] / p.rest_length, 1.0)) - design.margin
             turns = self._slots.index(_ANGLE)
             table[2:, turns] = np.minimum(table[2:, turns], top)
-        stride = whole(self._map, start, self._also)._replace(energy=self._energy)
-        near = None if guess is None else self._descend(stride, aim, table, guess)
-        if near is not None and near.residual <= (_REACHED if design.dense else _ACCEPTABLE):
-            return near
-        costs = np.array([self._cost(stride, aim, u) for u in self._grid])
-        seeds = np.argsort(costs)[:_SEEDS]
-        if near is not None and design.dense:
+        best = None if guess is None else self._descend(stride, aim, table, guess)
+        if best is not None and best.residual <= (_REACHED if design.dense else _ACCEPTABLE):
+            return best
+        grid = self._grid.copy()
+        if guess is not None:
+            for slot in design.kept:
+                grid[:, slot] = guess[slot]
+        residuals = np.array([self._solution(stride, aim, u.copy()).residual for u in grid])
+        seeds = np.argsort(residuals)[:_SEEDS]
+        if best is not None and design.dense:
             # A seed worse than what is found leads nowhere better.
-            seeds = seeds[costs[seeds] <= near.residual**2]
+            seeds = seeds[residuals[seeds] <= best.residual]
         for seed in seeds:
-            far = self._descend(stride, aim, table, self._grid[seed])
-            if near is None or far.residual < near.residual:
-                near = far
-            if near.residual <= _ACCEPTABLE:
+            found = self._descend(stride, aim, table, grid[seed])
+            if best is None or found.residual < best.residual:
+                best = found
+            if best.residual <= _ACCEPTABLE:
                 break
-        assert near is not None
-        return near
+        assert best is not None
+        return best
 
     def _descend(self, stride: StrideEnd, aim: Array, table: Array, start: Array) -> StepSolution:
         """The best controls that are found from some; ``aim`` has the compression too."""
         table[0] = np.clip(start[self._slots], *table[2:])
         prior = Prior(start, self._slots, table, TARGET_ONLY, LEAST_PULL)
         u, _ = solve_stride(stride, aim, prior, np.eye(len(aim)))
+        return self._solution(stride, aim, u)
+
+    def _solution(self, stride: StrideEnd, aim: Array, u: Array) -> StepSolution:
+        """Controls, which (38) may complete, and what they do."""
         end, outcome = stride(u)
-        residual = np.inf
-        if outcome is Outcome.SECTION:
-            residual = float(np.linalg.norm(aim - end))
+        completed = outcome is Outcome.SECTION
+        residual = float(np.linalg.norm(aim - end)) if completed else np.inf
         predicted = end[: self._map.dimensions[1]]
         return StepSolution(u, predicted, residual, outcome, residual <= _REACHED)
-
-    def _cost(self, stride: StrideEnd, aim: Array, u: Array) -> float:
-        """Squared error, as in (36); inf where the stride fails."""
-        end, outcome = stride(u.copy())
-        error = aim - end
-        return float(error @ error) if outcome is Outcome.SECTION else np.inf
 
     def _check(self, target: Array) -> None:
         p = self._map.parameters
@@ -249,10 +243,8 @@ class ModifiedWalking(Controller):
         axes={(_ANGLE,): np.arange(58.0, 81.0, 1.0)},
         dense=True,
         margin=0.05,
+        by_energy=True,
     )
-
-    def _prepare(self, target: Array, guess: Array | None) -> None:
-        self._energy = Aim(target, _KAPPA_2 * self._map.parameters.leg_stiffness)
 
 
 class WalkToRun(Controller):
@@ -274,6 +266,7 @@ class WalkToRun(Controller):
             (Slot.K_SC_WR,): (0.4, 0.6, 0.9, 1.2, 1.6, 2.2),
             (Slot.K_SD_WR,): (0.8, 1.4, 2.0, 2.6, 3.5, 6.0),
         },
+        kept=_LANDING,
     )
 
     @checked
@@ -283,12 +276,9 @@ class WalkToRun(Controller):
         kind: MapKind = MapKind.EXACT,
         simplified: bool = False,
     ) -> None:
-        stride = self.design.stride + ("*" if simplified else "")
-        self._search_on(ReturnMap(parameters, stride, kind))
-
-    def _prepare(self, target: Array, guess: Array | None) -> None:
-        if guess is not None:
-            self._grid[:, :3] = guess[:3]
+        super().__init__(parameters, kind)
+        if simplified:
+            self._map = ReturnMap(parameters, StrideKind.WALK_TO_RUN_SIMPLIFIED, kind)
 
 
 class RunToWalk(Controller):

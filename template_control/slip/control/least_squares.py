@@ -113,12 +113,9 @@ def _point(count: int, size: int) -> _Point:
 
 @compiled
 def _copy(source: _Point, target: _Point) -> None:
-    for i in range(source.x.shape[0]):
-        target.x[i] = source.x[i]
-    for r in range(source.residual.shape[0]):
-        target.residual[r] = source.residual[r]
-        for i in range(source.x.shape[0]):
-            target.rows[r, i] = source.rows[r, i]
+    target.x[:] = source.x
+    target.residual[:] = source.residual
+    target.rows[:] = source.rows
 
 
 @compiled
@@ -134,8 +131,7 @@ def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
         cost = evaluate(problem, there.x, there.residual)
         if cost < least:
             least = cost
-            for i in range(size):
-                best.x[i] = there.x[i]
+            best.x[:] = there.x
     return least
 
 
@@ -148,8 +144,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
     """
     size = x.shape[0]
     here, best, there = _point(count, size), _point(count, size), _point(count, size)
-    for i in range(size):
-        best.x[i] = x[i]
+    best.x[:] = x
     least = evaluate(problem, best.x, best.residual)
     if not least < np.inf:
         if not _from_grid(problem, search.grid, there, best) < np.inf:
@@ -163,7 +158,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
         longest, foreseen = 0.0, 0.0
         for i in range(size):
             longest = max(longest, abs(aim[i] - here.x[i]) / problem.change[i])
-            there.x[i] = aim[i]
+        there.x[:] = aim
         for r in range(count):
             linear = here.residual[r]
             for i in range(size):
@@ -186,16 +181,14 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
             _copy(best, here)
             continue
         if known and last:
-            for i in range(size):
-                best.x[i] = there.x[i]
+            best.x[:] = there.x
         if last:
             break
         slopes(problem, there.x, there.rows)
         _copy(there, here)
         if known:
             _copy(there, best)
-    for i in range(size):
-        x[i] = best.x[i]
+    x[:] = best.x
     if not known:
         evaluate(problem, x, there.residual)
     return least

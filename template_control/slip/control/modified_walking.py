@@ -45,7 +45,7 @@ def modified_step(
     kernel: Kernel,
     kind: int | None,
     z: Array,
-    aim: Aim,
+    aim: Aim | None,
     controls: Array,
     scratch: Scratch,
     result: Array,
@@ -53,8 +53,10 @@ def modified_step(
     """One step with kappa_2 of (38), kept within its bounds; returns the Outcome's value.
 
     As :func:`~template_control.slip.maps.return_map.one_stride`; kappa_2 of the controls is
-    overwritten.
+    overwritten, but without an ``aim``.
     """
+    if aim is None:
+        return one_stride(kernel, kind, z, controls, scratch, result)
     stiffness_range = aim.stiffness_range
     # The first pass finds the virtual bottom, which kappa_2 does not influence.
     controls[Slot.K_SD] = controls[Slot.K_SC]
@@ -123,7 +125,7 @@ def search_angle(
 
 @compiled
 def modified_jacobian(
-    at: tuple[Kernel, int | None, Array, Aim],
+    at: tuple[Kernel, int | None, Array, Aim | None],
     controls: Array,
     columns: IntArray,
     work: MapWorkspace,
@@ -138,6 +140,8 @@ def modified_jacobian(
     """
     kernel, kind, z, aim = at
     outcome = section_jacobian(kernel, kind, z, controls, columns, work, found)
+    if aim is None:
+        return outcome
     result, jacobian, last = found.result, found.jacobian, columns.shape[0] - 1
     rest, kappa_1, kappa_2 = kernel.rest_length, controls[Slot.K_SC], controls[Slot.K_SD]
     if not aim.stiffness_range[0] < kappa_2 < aim.stiffness_range[1]:

@@ -15,7 +15,7 @@ import numpy as np
 from numba import types
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled, inner, inner_by_type
+from template_control.compiled import compiled, inner_by_type
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
 from template_control.slip.control.modified_walking import Aim, modified_jacobian, modified_step
@@ -26,8 +26,6 @@ from template_control.slip.maps.return_map import (
     Derivatives,
     MapWorkspace,
     ReturnMap,
-    one_stride,
-    section_jacobian,
 )
 from template_control.slip.maps.section import PADDED, section_of
 
@@ -51,11 +49,8 @@ class StrideEnd(NamedTuple):
 
     def __call__(self, u: Array) -> tuple[Array, Outcome]:
         """(m,) where it ends, and how, with (NUM_SLOTS,) controls ``u``; (38) completes them."""
-        at, result = self[:3], np.empty(RESULTS)
-        if self.energy is None:
-            outcome = one_stride(*at, u, self.work.scratch, result)
-        else:
-            outcome = modified_step(*at, self.energy, u, self.work.scratch, result)
+        result = np.empty(RESULTS)
+        outcome = modified_step(*self[:3], self.energy, u, self.work.scratch, result)
         return result[self.ends], Outcome(outcome)
 
 
@@ -97,25 +92,6 @@ class StrideProblem(NamedTuple):
     jacobian: Array  # (RESULTS, f) of these, overwritten
 
 
-@inner
-def _run(energy: Aim | None, p: StrideProblem) -> int:
-    """Run the stride of a problem, with kappa_2 by (38) if it is; returns the Outcome's value."""
-    s, scratch = p.stride, p.stride.work.scratch
-    if energy is None:
-        return one_stride(s.kernel, s.kind, s.start, p.controls, scratch, p.result)
-    return modified_step(s.kernel, s.kind, s.start, energy, p.controls, scratch, p.result)
-
-
-@inner
-def _derive(energy: Aim | None, p: StrideProblem, found: Derivatives) -> int:
-    """The derivatives of the same; returns the Outcome's value."""
-    s = p.stride
-    if energy is None:
-        return section_jacobian(s.kernel, s.kind, s.start, p.controls, p.columns, s.work, found)
-    at = s.kernel, s.kind, s.start, energy
-    return modified_jacobian(at, p.controls, p.columns, s.work, found)
-
-
 def of_type(problem: Any, kind: type) -> bool:
     """True if a compiled argument is a named tuple of this class."""
     return isinstance(problem, types.BaseNamedTuple) and problem.instance_class is kind
@@ -130,7 +106,9 @@ def _stride_evaluate(problem: Any, x: Any, residual: Any) -> Any:
         m = ends.shape[0]
         for i in range(x.shape[0]):
             p.controls[p.slots[i]] = x[i]
-        if _run(p.stride.energy, p) != Outcome.SECTION:
+        s, scratch = p.stride, p.stride.work.scratch
+        outcome = modified_step(s.kernel, s.kind, s.start, s.energy, p.controls, scratch, p.result)
+        if outcome != Outcome.SECTION:
             return np.inf
         total = 0.0
         for i in range(m):
@@ -151,9 +129,12 @@ def _stride_slopes(problem: Any, x: Any, rows: Any) -> Any:
     """:func:`~.least_squares.slopes` of a :class:`StrideProblem`."""
 
     def at(problem: Any, x: Any, rows: Any) -> Any:
-        p, ends = problem, problem.stride.ends
+        p, s, ends = problem, problem.stride, problem.stride.ends
         m = ends.shape[0]
-        _derive(p.stride.energy, p, Derivatives(p.result, p.jacobian))
+        found = Derivatives(p.result, p.jacobian)
+        modified_jacobian(
+            (s.kernel, s.kind, s.start, s.energy), p.controls, p.columns, s.work, found
+        )
         for c in range(x.shape[0]):
             for i in range(m):
                 rows[i, c] = 0.0

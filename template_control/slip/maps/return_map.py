@@ -59,16 +59,6 @@ def closed_form(kind: MapKind) -> int | None:
 
 
 @inner
-def _stride(
-    kernel: Kernel, kind: int | None, state: Array, toes: Array, controls: Array, scratch: Scratch
-) -> int:
-    """One stride from ``state``, which is overwritten; returns the Outcome's value."""
-    if kind is None:
-        return run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
-    return closed_form_stride(kernel, kind, state, toes, controls, scratch)
-
-
-@inner
 def _begin(z: Array, scratch: Scratch) -> None:
     """Put a stride's start over the origin, where both toes are, or where it says."""
     state = scratch.state
@@ -103,7 +93,11 @@ def one_stride(
     NaN of legs that had no bottom or touchdown. ``kind`` is from :func:`closed_form`.
     """
     _begin(z, scratch)
-    outcome = _stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
+    if kind is None:
+        state, toes = scratch.state, scratch.toes
+        outcome = run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
+    else:
+        outcome = closed_form_stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
     _conclude(scratch, result)
     return outcome
 
@@ -121,31 +115,6 @@ def map_many(
     """As :func:`one_stride`, for each row of all arrays; ``outcome`` (n,) is overwritten too."""
     for i in range(z.shape[0]):
         outcome[i] = one_stride(kernel, kind, z[i], controls[i], scratch, result[i])
-
-
-@inner
-def _tangents(
-    kernel: Kernel,
-    z: Array,
-    controls: Array,
-    columns: IntArray,
-    work: MapWorkspace,
-    found: Derivatives,
-) -> int:
-    """:func:`section_jacobian` of the exact map, by :func:`~.tangent.stride_tangents`."""
-    scratch, tangents = work
-    _begin(z, scratch)
-    ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
-    _conclude(scratch, found.result)
-    stride_tangents(kernel, controls, ended[2], ended[3], scratch, tangents)
-    state, lengths, jacobian = tangents.state, tangents.lengths, found.jacobian
-    for c in range(columns.shape[0]):
-        j = columns[c]
-        jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
-        jacobian[3, c] = state[0, j]
-        for leg in range(3):
-            jacobian[4 + leg, c] = lengths[leg, j]
-    return ended[0]
 
 
 @inner
@@ -195,9 +164,20 @@ def section_jacobian(
     form to about 1e-9 of the value (central differences). ``columns`` (c,) are what to
     differentiate by: 0 to 2 the state, 3 + slot the controls.
     """
-    if kind is None:
-        return _tangents(kernel, z, controls, columns, work, found)
-    return _differences(kernel, kind, z, controls, columns, work, found)
+    if kind is not None:
+        return _differences(kernel, kind, z, controls, columns, work, found)
+    scratch, tangents = work
+    _begin(z, scratch)
+    ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
+    _conclude(scratch, found.result)
+    stride_tangents(kernel, controls, ended[2], ended[3], scratch, tangents)
+    state, lengths, jacobian = tangents.state, tangents.lengths, found.jacobian
+    for c in range(columns.shape[0]):
+        j = columns[c]
+        jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
+        jacobian[3, c] = state[0, j]
+        jacobian[4:, c] = lengths[:, j]
+    return ended[0]
 
 
 class Mapped(NamedTuple):
