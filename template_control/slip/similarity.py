@@ -100,28 +100,25 @@ def scaled(options: T, scale: Scale) -> T:
 
     Fields from :func:`tuned` are scaled, also those of dataclasses in fields, tuples or mappings.
     """
-    changes: dict[str, Any] = {}
-    for f in fields(options):  # type: ignore[arg-type]
-        value = getattr(options, f.name)
-        if _KEY in f.metadata:
-            changes[f.name] = _scaled_number(value, f.metadata[_KEY], scale)
-        else:
-            changes[f.name] = _scaled_inside(value, scale)
+    changes = {
+        f.name: _scaled_value(getattr(options, f.name), f.metadata.get(_KEY), scale)
+        for f in fields(options)  # type: ignore[arg-type]
+    }
     return replace(options, **changes)  # type: ignore[type-var]
 
 
-def _scaled_number(value: Any, dimensions: tuple[Dimension, ...], scale: Scale) -> Any:
-    if value is None:
-        return None
-    if not isinstance(value, tuple):
-        return value if dimensions[0] == NUMBER else value * scale.factor(dimensions[0])
-    each = dimensions * len(value) if len(dimensions) == 1 else dimensions
-    if value and isinstance(value[0], tuple):
-        return tuple(_scaled_number(entry, dimensions, scale) for entry in value)
-    return tuple(
-        _scaled_number(entry, (dimension,), scale)
-        for entry, dimension in zip(value, each, strict=True)
-    )
+def _scaled_value(value: Any, dimensions: tuple[Dimension, ...] | None, scale: Scale) -> Any:
+    if dimensions is None:
+        return _scaled_inside(value, scale)
+    if isinstance(value, tuple):
+        nested = value and isinstance(value[0], tuple)
+        if nested or len(dimensions) == 1:
+            return tuple(_scaled_value(entry, dimensions, scale) for entry in value)
+        pairs = zip(value, dimensions, strict=True)
+        return tuple(_scaled_value(entry, (dimension,), scale) for entry, dimension in pairs)
+    if value is None or dimensions[0] == NUMBER:
+        return value
+    return value * scale.factor(dimensions[0])
 
 
 def _scaled_inside(value: Any, scale: Scale) -> Any:

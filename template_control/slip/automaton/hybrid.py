@@ -199,14 +199,13 @@ class Automaton:
         Raises:
             ParameterError: if there is none.
         """
-        events = [self.sections(node_name)[0]] if node_name in self.starts.values() else []
         reached = [(node, edge) for node in self.nodes for edge in node.edges if edge.section]
-        for node, edge in reached:
-            if edge.target == node_name:
-                return node
-        for node, edge in reached:
-            if edge.event in events:
-                return node
+        found = [node for node, edge in reached if edge.target == node_name]
+        if not found and node_name in self.starts.values():
+            event = self.sections(node_name)[0]
+            found = [node for node, edge in reached if edge.event is event]
+        if found:
+            return found[0]
         raise ParameterError(f"no section leads to {node_name}: give the start of a stride")
 
     def successor(self, name: str, event: Event) -> str:

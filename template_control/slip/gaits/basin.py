@@ -39,17 +39,6 @@ def _for_each(name: str, rows: Array, count: int) -> Array:
     return np.ascontiguousarray(np.broadcast_to(rows, (count, rows.shape[-1])))
 
 
-def _together(**arrays: ArrayLike) -> list[Array]:
-    """Arrays by name that broadcast; a ParameterError with names and shapes if they do not."""
-    found = [np.asarray(array, dtype=float) for array in arrays.values()]
-    try:
-        np.broadcast_shapes(*(array.shape for array in found))
-    except ValueError:
-        shapes = ", ".join(f"{k} {a.shape}" for k, a in zip(arrays, found, strict=True))
-        raise ParameterError(f"shapes do not go together: {shapes}; give as many of each") from None
-    return found
-
-
 @checked
 def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: ArrayLike) -> Array:
     """VLO states from height, direction of the velocity and energy; shapes broadcast.
@@ -63,7 +52,12 @@ def vlo_state(parameters: SlipParameters, y: ArrayLike, phi: ArrayLike, energy: 
     Returns:
         (..., 3) dx/dt, y, dy/dt; the speeds are NaN where the energy does not suffice.
     """
-    y, phi, energy = np.broadcast_arrays(*_together(y=y, phi=phi, energy=energy))
+    given = {"y": y, "phi": phi, "energy": energy}
+    try:
+        y, phi, energy = np.broadcast_arrays(*given.values())
+    except ValueError:
+        shapes = ", ".join(f"{name} {np.shape(array)}" for name, array in given.items())
+        raise ParameterError(f"shapes do not go together: {shapes}; give as many of each") from None
     v = VLO.speed(parameters, y, energy)
     return np.stack((v * np.cos(phi), y, -v * np.sin(phi)), axis=-1)
 

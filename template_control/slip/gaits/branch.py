@@ -111,15 +111,8 @@ class BranchPoint:
         """One of :data:`QUANTITIES`, the angle in radians, or the controller's "target"."""
         if name == "target" and self.target is not None:
             return self.target
-        return float(
-            {
-                "energy": self.energy,
-                "angle": self.angle,
-                "stiffness": self.stiffness,
-                "height": self.state[1],
-                "speed": self.state[0],
-            }[name]
-        )
+        values = (self.energy, self.angle, self.stiffness, self.state[1], self.state[0])
+        return float(values[QUANTITIES.index(name)])
 
 
 class Equations(NamedTuple):

@@ -46,9 +46,6 @@ class Family(branch.Branch):
                 f"fixed quantities are {', '.join(fixed) or 'none'}: give two of"
                 f" {', '.join(branch.QUANTITIES)}"
             )
-        for name, value in fixed.items():
-            if not np.isfinite(value):
-                raise ParameterError(f"{name} is {value!r}: give a finite number")
         self.parameters = parameters
         self.fixed = dict(fixed)
         self.free = tuple(q for q in branch.QUANTITIES if q not in fixed)

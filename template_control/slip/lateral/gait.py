@@ -167,24 +167,18 @@ def lateral_gait(
     m = transition(path, 0.0, path.section)
     a, b = m[:, :2], m[:, _NEXT] - (1.0, 0.0)
     o = scaled(options or LateralOptions(), Scale.of(p))
-    cost = _cost_to_go(a, b, np.array(o.state_cost), o.step_cost)
+    try:
+        cost = solve_discrete_are(a, b[:, None], np.diag(o.state_cost), np.array([[o.step_cost]]))
+    except np.linalg.LinAlgError:
+        raise GaitError(
+            "no law brings the sideways motion of this gait back: choose another gait"
+        ) from None
     gain = (b @ cost @ a) / (o.step_cost + b @ cost @ b)
     width = 1.0 if start.stance else o.running_width
     ahead = 0.0 if start.stance else float(stride.state[0] - max(stride.toes))
     return LateralGait(
         a.copy(), b, cost, gain, float(state[0]), width, length=gait.step_length, ahead=ahead
     )
-
-
-def _cost_to_go(a: Array, b: Array, state_cost: Array, step_cost: float) -> Array:
-    """The Riccati equation's solution (2, 2)."""
-    try:
-        found = solve_discrete_are(a, b[:, None], np.diag(state_cost), np.array([[step_cost]]))
-    except np.linalg.LinAlgError:
-        raise GaitError(
-            "no law brings the sideways motion of this gait back: choose another gait"
-        ) from None
-    return np.asarray(found)
 
 
 @dataclass(frozen=True)

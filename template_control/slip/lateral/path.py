@@ -176,13 +176,15 @@ def pulls(path: LateralPath, row: int, time: float, com: Array, out: Array) -> N
 
 
 @compiled
-def _advance(path: LateralPath, start: float, end: float, motion: Array) -> None:
-    """Carry motions on along the path, by the classical Runge-Kutta method.
+def transition(path: LateralPath, start: float, end: float) -> Array:
+    """(2, COLUMNS) matrix M of the motion between two times on the path.
 
-    ``end`` is at most the path's section [s]. ``motion`` (2, COLUMNS) are y and dy/dt at ``start``,
-    overwritten by those at ``end``, per unit of y, dy/dt and each foothold's y at some earlier
-    time.
+    (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m], by the classical
+    Runge-Kutta method; ``end`` is at most the path's section [s]. A shift of all of them shifts the
+    end alike: M[:, 0] + M[:, 2:].sum(1) = (1, 0).
     """
+    motion = np.zeros((2, COLUMNS))
+    motion[0, 0] = motion[1, 1] = 1.0
     com, before, middle, after = np.empty(6), np.empty(2), np.empty(2), np.empty(2)
     meta, footholds = path.meta, path.footholds
     for row in range(meta.shape[0]):
@@ -218,19 +220,6 @@ def _advance(path: LateralPath, start: float, end: float, motion: Array) -> None
                 motion[1, j] = v + dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
             before[0], before[1] = after[0], after[1]
             t += h
-
-
-@compiled
-def transition(path: LateralPath, start: float, end: float) -> Array:
-    """(2, COLUMNS) matrix M of the motion between two times on the path.
-
-    (y, dy/dt)(end) = M (y, dy/dt, y_0, y_1, y_2), y_i the footholds' [m]; ``end`` is at most the
-    path's section [s]. A shift of all of them shifts the end alike: M[:, 0] + M[:, 2:].sum(1) = (1,
-    0).
-    """
-    motion = np.zeros((2, COLUMNS))
-    motion[0, 0] = motion[1, 1] = 1.0
-    _advance(path, start, end, motion)
     return motion
 
 

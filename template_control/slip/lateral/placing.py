@@ -34,10 +34,6 @@ _STRETCH_GAIN = 0.2  # share of a stance's surprise that enters the stretch
 _STRETCHES = 0.9, 1.2  # of single stance; one that is longer or shorter was disturbed
 
 
-def _nothing() -> Array:
-    return np.zeros((len(Side), 2))
-
-
 @dataclass(frozen=True)
 class LateralLearnt:
     """State of the sideways learning; each lesson gives a new one.
@@ -48,7 +44,7 @@ class LateralLearnt:
         stretch: duration of single stance over the template's.
     """
 
-    offset: Array = field(default_factory=_nothing)
+    offset: Array = field(default_factory=lambda: np.zeros((len(Side), 2)))
     stretch: float = 1.0
 
     def after_step(
@@ -251,16 +247,7 @@ def sideways() -> None:
     stride = simulate_stride(p, STRIDE_START[StrideKind.WALK], VLO.state([1.1, 0.978, 0.0]), u)
     path, two = lateral_path((stride,), p.gravity), np.zeros(2)
     acceleration(path, 0.0, 0.0, np.zeros(NEXT + 1))
-    aim = LateralAim(
-        state=two,
-        step=0.1,
-        cost=np.eye(2),
-        step_cost=0.1,
-        offset=two,
-        steps=two,
-        reach=0.1,
-    )
-    place(path, aim, 0.0, two, two)
+    place(path, LateralAim(two, 0.1, np.eye(2), 0.1, two, two, 0.1), 0.0, two, two)
 
 
 LATERAL = (Part(sideways, 2.0),)
