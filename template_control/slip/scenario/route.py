@@ -149,9 +149,7 @@ class SteadyRoute:
         """See :meth:`Route.next`."""
         return self._goal
 
-    def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
-        """See :meth:`Route.ahead`."""
-        return self._goal
+    ahead = next
 
 
 @dataclass(frozen=True)

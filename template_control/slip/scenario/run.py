@@ -160,6 +160,11 @@ class _Made(NamedTuple):
     solve_seconds: float
     stride: Stride
 
+    @property
+    def ended(self) -> float:
+        """When its section was reached [s]."""
+        return self.began + self.stride.duration
+
     def samples(self) -> Array:
         """(_SAMPLES, 10) time, state, node, toes, stiffnesses."""
         times = np.linspace(0.0, self.stride.duration, _SAMPLES, endpoint=False)
@@ -179,12 +184,8 @@ class _Controllers:
     def __init__(self, scenario: Scenario) -> None:
         p, kind = scenario.parameters, scenario.map_kind
         walking = ModifiedWalking if scenario.walking == "modified" else ActiveWalking
-        self._by_stride: dict[str, Controller] = {
-            StrideKind.WALK: walking(p, kind),
-            StrideKind.WALK_TO_RUN: WalkToRun(p, kind),
-            StrideKind.RUN: ActiveRunning(p, kind),
-            StrideKind.RUN_TO_WALK: RunToWalk(p, kind),
-        }
+        made = (walking, WalkToRun, ActiveRunning, RunToWalk)
+        self._by_stride: dict[str, Controller] = {c.design.stride: c(p, kind) for c in made}
         k0 = p.leg_stiffness
         first = controls(np.radians(scenario.touchdown_angle), k0, k0)
         self._guesses: dict[str, Array] = {StrideKind.WALK: first}
@@ -192,18 +193,18 @@ class _Controllers:
 
     def solve(self, z: Array, goal: StrideGoal) -> StepSolution:
         """Controls of the stride from section state ``z`` (n,) that ``goal`` asks for."""
-        kind = goal.stride
-        if kind == StrideKind.WALK_TO_RUN:
+        if goal.stride == StrideKind.WALK_TO_RUN:
             # The rear leg walks on: its controls are the walking controller's.
-            walk = self._by_stride[StrideKind.WALK].solve(
-                z, self._walking_target, self._guesses[StrideKind.WALK]
-            )
-            self._guesses[kind] = walk.controls
-        solution = self._by_stride[kind].solve(z, goal.target, self._guesses.get(kind))
-        self._guesses[kind] = solution.controls
-        if kind == StrideKind.WALK:
+            walk = self._search(StrideKind.WALK, z, self._walking_target)
+            self._guesses[StrideKind.WALK_TO_RUN] = walk.controls
+        elif goal.stride == StrideKind.WALK:
             self._walking_target = goal.target
+        solution = self._search(goal.stride, z, goal.target)
+        self._guesses[goal.stride] = solution.controls
         return solution
+
+    def _search(self, stride: str, z: Array, target: Array) -> StepSolution:
+        return self._by_stride[stride].solve(z, target, self._guesses.get(stride))
 
 
 @checked
@@ -226,16 +227,11 @@ def simulate_scenario(
         raise ScenarioError("the template cannot stand: give the scenario a segment that walks")
     route, controllers = ScenarioRoute(moving), _Controllers(moving)
     simulator = StrideSimulator(moving.parameters)
-    section, state = route.section, route.section.state(route.start)
+    section, z = route.section, route.start
+    first = state = section.state(z)
     made: list[_Made] = []
     now, failure = 0.0, ""
-    # At an apex, too, dy/dt is kept as it was found.
-    sections = [(now, VLO.of(state))]
-    while True:
-        z = section.of(state)
-        goal = route.next(section, z, now)
-        if goal is None:
-            break
+    while not failure and (goal := route.next(section, z, now)) is not None:
         if len(made) == MOST_STRIDES:
             failure = f"stopped in segment {goal.segment + 1}, after {MOST_STRIDES} strides"
             break
@@ -250,16 +246,14 @@ def simulate_scenario(
         stride = simulator.run(start, state, solution.controls, (toe, toe))
         made.append(_Made(now, goal, solution, seconds, stride))
         route.took(stride.duration)
-        now += stride.duration
-        state = stride.state
-        sections.append((now, VLO.of(state)))
+        now, state = made[-1].ended, stride.state
         if progress is not None:
             progress(now)
         if not stride.completed:
             failure = f"stride {len(made)} ({goal.stride}): {stride.outcome.reason}"
-            break
         section = section_of(AUTOMATON.sections(start)[1])
-    return _record(moving, made, sections, failure)
+        z = section.of(state)
+    return _record(moving, first, made, failure)
 
 
 def _padded(states: list[Array]) -> Array:
@@ -267,9 +261,8 @@ def _padded(states: list[Array]) -> Array:
     return np.array([[*z, 0.0][:PADDED] for z in states])
 
 
-def _record(
-    scenario: Scenario, made: list[_Made], sections: list[tuple[float, Array]], failure: str
-) -> ScenarioRecord:
+def _record(scenario: Scenario, first: Array, made: list[_Made], failure: str) -> ScenarioRecord:
+    """The record of strides from the CoM's state ``first`` (4,) on."""
     table, length = np.concatenate([m.samples() for m in made]), scenario.parameters.rest_length
     metadata = {
         "name": scenario.name,
@@ -290,8 +283,11 @@ def _record(
         stiffness=table[:, 8:10],
         foothold=np.array([(0.0, 0.0), *(at for m in made for at in m.footholds(length))]),
         stride=np.array([_STRIDES.index(m.goal.stride) for m in made]),
-        section_time=np.array([t for t, _ in sections]),
-        section_state=np.array([z for _, z in sections]),
+        section_time=np.array([0.0, *(m.ended for m in made)]),
+        # At an apex, too, dy/dt is kept as it was found.
+        section_state=np.array(
+            [VLO.of(state) for state in (first, *(m.stride.state for m in made))]
+        ),
         wanted_speed=np.array([m.goal.wanted_speed for m in made]),
         target=_padded([m.goal.target for m in made]),
         predicted=_padded([m.solution.predicted for m in made]),
