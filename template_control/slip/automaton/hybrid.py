@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
@@ -88,25 +88,6 @@ class Tables(NamedTuple):
     outcome: IntArray  # (edges,) -1 if the stride goes on, else the Outcome it ends with
 
 
-def pack(nodes: Sequence[Node]) -> Tables:
-    """Pack an automaton's ``nodes`` into :class:`Tables`."""
-    index = {node.name: i for i, node in enumerate(nodes)}
-    edges = [edge for node in nodes for edge in node.edges]
-
-    def ends(edge: Edge) -> tuple[int, int]:
-        """Successor node, and outcome."""
-        if isinstance(edge.target, Outcome):
-            return -1, edge.target
-        return index[edge.target], Outcome.SECTION if edge.section else -1
-
-    slots = [[-1 if slot is None else slot for slot in (n.rear, n.front)] for n in nodes]
-    rear, front = np.array(slots, dtype=np.int64).reshape(-1, 2).T.copy()
-    rows = [(edge.event, edge.reset, *ends(edge)) for edge in edges]
-    event, reset, target, outcome = np.array(rows, dtype=np.int64).reshape(-1, 4).T.copy()
-    first_edge = np.cumsum([0, *(len(node.edges) for node in nodes)], dtype=np.int64)
-    return Tables(rear, front, first_edge, event, target, reset, outcome)
-
-
 _BEGINS = {Phase.F: Event.APEX, Phase.SS: Event.VLO, Phase.DS: Event.REST}
 """The section at which a stride begins, by the phase of its first node."""
 
@@ -141,22 +122,28 @@ class Automaton:
     @cached_property
     def tables(self) -> Tables:
         """The automaton as the compiled kernels read it."""
-        return pack(self.nodes)
+        rows, slots = [], []
+        for node in self.nodes:
+            slots.append([-1 if slot is None else slot for slot in (node.rear, node.front)])
+            for edge in node.edges:
+                if isinstance(edge.target, Outcome):
+                    target, outcome = -1, int(edge.target)
+                else:
+                    target = self.index[edge.target]
+                    outcome = Outcome.SECTION if edge.section else -1
+                rows.append((edge.event, target, edge.reset, outcome))
+        rear, front = np.array(slots, dtype=np.int64).reshape(-1, 2).T.copy()
+        first_edge = np.cumsum([0, *(len(node.edges) for node in self.nodes)], dtype=np.int64)
+        return Tables(
+            rear, front, first_edge, *np.array(rows, dtype=np.int64).reshape(-1, 4).T.copy()
+        )
 
     def node(self, name: str) -> Node:
-        """The node called ``name``.
-
-        Raises:
-            KeyError: if there is none.
-        """
+        """The node called ``name``; a KeyError if there is none."""
         return self.nodes[self.index[name]]
 
     def start(self, stride: str) -> Node:
-        """First node of a kind of stride.
-
-        Raises:
-            ParameterError: if there is no such stride.
-        """
+        """First node of a kind of stride; a ParameterError if there is no such stride."""
         if stride not in self.starts:
             raise ParameterError(f"no stride {stride!r}: give one of {', '.join(self.starts)}")
         return self.node(self.starts[stride])
@@ -175,8 +162,7 @@ class Automaton:
     def sections(self, start: str) -> tuple[Event, Event]:
         """Sections (VLO, APEX or REST) at which a stride from ``start`` begins and ends.
 
-        Raises:
-            ParameterError: if no section ends it.
+        A ParameterError if no section ends it.
         """
         if start not in self._sections:
             edges = [edge for node in self.stride(start) for edge in node.edges if edge.section]
@@ -194,10 +180,8 @@ class Automaton:
         """The node that leads to the section at which ``node_name`` begins.
 
         It is the first whose section leads there; for a start that is only chosen at a
-        section, such as a transition's, the first whose section is the same.
-
-        Raises:
-            ParameterError: if there is none.
+        section, such as a transition's, the first whose section is the same. A ParameterError if
+        there is none.
         """
         reached = [(node, edge) for node in self.nodes for edge in node.edges if edge.section]
         found = [node for node, edge in reached if edge.target == node_name]
@@ -211,13 +195,8 @@ class Automaton:
     def successor(self, name: str, event: Event) -> str:
         """Name of the node that follows ``name`` when ``event`` fires.
 
-        Args:
-            name: of the node that is left.
-            event: the guard of one of its edges.
-
-        Raises:
-            KeyError: if there is no node ``name``, or ``event`` is no way out of it, or ends the
-                stride in failure.
+        A KeyError if there is no node ``name``, or ``event`` is no way out of it, or ends the
+        stride in failure.
         """
         edge = self.node(name).edge(event)
         if edge is None or isinstance(edge.target, Outcome):

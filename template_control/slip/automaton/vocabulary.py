@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum, StrEnum
-from typing import Literal
+from typing import Literal, Self
 
 
 class StrideKind(StrEnum):
@@ -132,31 +132,27 @@ class Reset(IntEnum):
 
 
 class Outcome(IntEnum):
-    """End of a stride: at its section, or the reason why not."""
+    """End of a stride: at its section, or the reason why not.
 
-    SECTION = 0
-    FALL = 1
-    UNWANTED_FLIGHT = 2
-    BACKWARD = 3
-    NO_TOUCHDOWN = 4
-    NO_LIFTOFF = 5
-    TIMEOUT = 6
+    Attributes:
+        reason: the outcome in words.
+    """
 
-    @property
-    def reason(self) -> str:
-        """The outcome in words."""
-        return _REASONS[self]
+    reason: str
 
+    SECTION = 0, "reached its section"
+    FALL = 1, "the CoM fell to the ground"
+    UNWANTED_FLIGHT = 2, "a stance foot left the ground too early"
+    BACKWARD = 3, "the CoM turned backward"
+    NO_TOUCHDOWN = 4, "no leg touched down in time"
+    NO_LIFTOFF = 5, "the CoM passed the front foot before the rear leg lifted off"
+    TIMEOUT = 6, "no event within the time limit"
 
-_REASONS = {
-    Outcome.SECTION: "reached its section",
-    Outcome.FALL: "the CoM fell to the ground",
-    Outcome.UNWANTED_FLIGHT: "a stance foot left the ground too early",
-    Outcome.BACKWARD: "the CoM turned backward",
-    Outcome.NO_TOUCHDOWN: "no leg touched down in time",
-    Outcome.NO_LIFTOFF: "the CoM passed the front foot before the rear leg lifted off",
-    Outcome.TIMEOUT: "no event within the time limit",
-}
+    def __new__(cls, value: int, reason: str = "") -> Self:
+        """A number with words."""
+        member = int.__new__(cls, value)
+        member._value_, member.reason = value, reason
+        return member
 
 
 class MapKind(IntEnum):

@@ -125,7 +125,8 @@ def search_angle(
 
 @compiled
 def modified_jacobian(
-    at: tuple[Kernel, int | None, Array, Aim | None],
+    at: tuple[Kernel, int | None, Array],
+    aim: Aim | None,
     controls: Array,
     columns: IntArray,
     work: MapWorkspace,
@@ -133,12 +134,12 @@ def modified_jacobian(
 ) -> int:
     """As :func:`~template_control.slip.maps.return_map.section_jacobian`, with kappa_2 of (38).
 
-    ``at`` is kernel, kind, z and aim of :func:`modified_step`. The column of kappa_2 is the last
-    one; along with the others it varies by
+    ``at`` are kernel, kind and z. The column of kappa_2 is the last one; along with the others it
+    varies by
 
         dkappa_2 = ((kappa_1 - kappa_2) dmu_3 + (mu_3 - mu_2) dkappa_1) / (mu_3 - mu_1).
     """
-    kernel, kind, z, aim = at
+    kernel, kind, z = at
     outcome = section_jacobian(kernel, kind, z, controls, columns, work, found)
     if aim is None:
         return outcome

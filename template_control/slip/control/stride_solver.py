@@ -21,12 +21,7 @@ from template_control.slip.control.least_squares import Search, evaluate, least_
 from template_control.slip.control.modified_walking import Aim, modified_jacobian, modified_step
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.dynamics.stride import StrideSimulator
-from template_control.slip.maps.return_map import (
-    RESULTS,
-    Derivatives,
-    MapWorkspace,
-    ReturnMap,
-)
+from template_control.slip.maps.return_map import RESULTS, Derivatives, MapWorkspace, ReturnMap
 from template_control.slip.maps.section import PADDED, section_of
 
 LEAST_PULL = 1e-6
@@ -132,9 +127,8 @@ def _stride_slopes(problem: Any, x: Any, rows: Any) -> Any:
         p, s, ends = problem, problem.stride, problem.stride.ends
         m = ends.shape[0]
         found = Derivatives(p.result, p.jacobian)
-        modified_jacobian(
-            (s.kernel, s.kind, s.start, s.energy), p.controls, p.columns, s.work, found
-        )
+        at = s.kernel, s.kind, s.start
+        modified_jacobian(at, s.energy, p.controls, p.columns, s.work, found)
         for c in range(x.shape[0]):
             for i in range(m):
                 rows[i, c] = 0.0

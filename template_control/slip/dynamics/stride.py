@@ -14,7 +14,7 @@ from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.hybrid import Automaton, Edge
+from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
 from template_control.slip.dynamics.kernel import new_scratch, plain, record_stride
 from template_control.slip.dynamics.model import Kernel, node_kernel
@@ -169,7 +169,16 @@ class StrideSimulator:
         self._names = tuple(node.name for node in automaton.nodes)
         # By numbers: to hash a member of an enumeration takes long.
         self._edges = [
-            {int(e.event): _described(n.name, e) for e in n.edges} for n in automaton.nodes
+            {
+                int(e.event): (
+                    e.event,
+                    node.name,
+                    e.target if isinstance(e.target, str) else "",
+                    e.reset,
+                )
+                for e in node.edges
+            }
+            for node in automaton.nodes
         ]
         self._kernels = {name: plain(self.kernel(name)) for name in automaton.index}
 
@@ -215,12 +224,6 @@ class StrideSimulator:
             event, source, entered, reset = edges[int(row[2])][int(row[1])]
             fired.append(FiredEvent(row[0], event, source, entered, state, reset))
         return tuple(fired)
-
-
-def _described(source: str, edge: Edge) -> tuple[Event, str, str, Reset]:
-    """Fields of a :class:`FiredEvent` that come from an edge."""
-    entered = edge.target if isinstance(edge.target, str) else ""
-    return edge.event, source, entered, edge.reset
 
 
 @checked

@@ -17,6 +17,7 @@ import numpy as np
 from template_control.arrays import Array, ComplexArray
 from template_control.errors import GaitError, ParameterError
 from template_control.slip.automaton.vocabulary import Slot
+from template_control.slip.maps.return_map import ReturnMap
 
 
 class Kind(Enum):
@@ -121,11 +122,14 @@ class Equations(NamedTuple):
     residual: Array  # (n,)
     jacobian: Array  # (n, n + 1) in scaled X
     valid: bool  # whether the stride ended at its section
+    controls: Array  # (NUM_SLOTS,) of the stride
+    loop: Array  # derivatives of the state at its end by that at its start
 
 
 class Branch(ABC):
     """A curve of gaits that can be followed."""
 
+    map: ReturnMap
     scale: Array  # (n + 1,) natural size of each coordinate
     free: tuple[str, ...]  # quantities that vary along it
     noise: float = 0.0  # an eigenvalue this close to the unit circle does not count as crossing it
@@ -138,12 +142,27 @@ class Branch(ABC):
         """Residual and Jacobian at X (n + 1,)."""
 
     @abstractmethod
-    def point(self, x: Array) -> BranchPoint:
-        """The branch point at X (n + 1,); its tangent is oriented arbitrarily."""
+    def stability(self, x: Array, loop: Array) -> tuple[float, float | None, ComplexArray]:
+        """Energy [J], target and eigenvalues at X (n + 1,), with its equations' ``loop``."""
 
     @abstractmethod
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
         """A quantity of :attr:`free` [SI, rad], and its gradient (n + 1,) in X, not scaled."""
+
+    def point(self, x: Array) -> BranchPoint:
+        """The branch point at X (n + 1,); its tangent is oriented arbitrarily."""
+        equations = self.equations(x)
+        energy, target, eigenvalues = self.stability(x, equations.loop)
+        return BranchPoint(
+            x=x.copy(),
+            state=x[: self.map.dimensions[0]].copy(),
+            controls=equations.controls,
+            energy=energy,
+            target=target,
+            eigenvalues=eigenvalues,
+            kind=classify(eigenvalues, self.noise),
+            tangent=np.linalg.svd(equations.jacobian)[2][-1],
+        )
 
     def correct(self, x: Array, direction: Array | None = None) -> Array:
         """X (n + 1,) of the gait nearest a guess, in the plane through it normal to a direction.
@@ -153,7 +172,7 @@ class Branch(ABC):
         start = x.copy()
         x = x.copy()
         for _ in range(_NEWTON):
-            residual, jacobian, valid = self.equations(x)
+            residual, jacobian, valid, *_ = self.equations(x)
             if not valid:
                 break
             if np.max(np.abs(residual)) < _CONVERGED:
@@ -265,11 +284,6 @@ class Branch(ABC):
     def _rate(self, point: BranchPoint, tangent: Array, name: str) -> float:
         """Rate of a quantity along the branch."""
         return float(self.quantity(point.x, name)[1] @ (tangent * self.scale))
-
-
-def null_vector(jacobian: Array) -> Array:
-    """(n + 1,) the direction an (n, n + 1) Jacobian leaves free."""
-    return np.asarray(np.linalg.svd(jacobian)[2][-1])
 
 
 def _pair(eigenvalues: ComplexArray) -> float:

@@ -18,7 +18,7 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.control.controllers import VARIED, TargetedPolicy
 from template_control.slip.gaits import branch
-from template_control.slip.maps.return_map import Linearisation, ReturnMap
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
 
@@ -57,48 +57,13 @@ class Family(branch.Branch):
         self.scale = np.array([*[speed, p.rest_length, speed][: self.n], 1.0, p.leg_stiffness])
         self._energy_scale = p.mass * p.gravity * p.rest_length
 
-    def point(self, x: Array) -> branch.BranchPoint:
-        """The branch point at X (n + 2,); its tangent is oriented arbitrarily."""
-        equations, linear = self._linearised(x)
-        energy, gradient = self.quantity(x, "energy")
-        eigenvalues = branch.shell_eigenvalues(linear.state_jacobian, gradient[: self.n])
-        return branch.BranchPoint(
-            x=x.copy(),
-            state=x[: self.n].copy(),
-            controls=self._controls(x),
-            energy=energy,
-            target=None,
-            eigenvalues=eigenvalues,
-            kind=branch.classify(eigenvalues),
-            tangent=branch.null_vector(equations.jacobian),
-        )
-
     def equations(self, x: Array) -> branch.Equations:
         """Residual (n + 1,) and Jacobian at X: the stride returns, two quantities are held."""
-        return self._linearised(x)[0]
-
-    def quantity(self, x: Array, name: str) -> tuple[float, Array]:
-        """See :meth:`~.branch.Branch.quantity`; any of :data:`~.branch.QUANTITIES` has a value.
-
-        X and the gradient are (n + 2,), with n the size of the section's state.
-        """
-        gradient = np.zeros(self.n + 2)
-        if name != "energy":
-            gradient[_COORDINATE[name]] = 1.0
-            return float(x[_COORDINATE[name]]), gradient
-        z = x[: self.n]
-        gradient[: self.n], gradient[-1] = energy_gradient(self.section, self.parameters, z, x[-1])
-        return float(self.section.energy(self.parameters, z, x[-1])), gradient
-
-    def _controls(self, x: Array) -> Array:
+        n = self.n
         u = np.zeros(NUM_SLOTS)
         u[Slot.TOUCHDOWN_ANGLE] = x[-2]
         u[[Slot.K_SC, Slot.K_SD]] = x[-1]
-        return u
-
-    def _linearised(self, x: Array) -> tuple[branch.Equations, Linearisation]:
-        n = self.n
-        linear = self.map.linearise(x[:n], self._controls(x))
+        linear = self.map.linearise(x[:n], u)
         stiffness = linear.control_jacobian[:, [Slot.K_SC, Slot.K_SD]].sum(axis=1)
         full = np.column_stack(
             (
@@ -116,7 +81,25 @@ class Family(branch.Branch):
             residual = np.append(residual, (held - value) / size)
             rows = np.vstack((rows, gradient / size))
         valid = linear.outcome is Outcome.SECTION
-        return branch.Equations(residual, rows * self.scale, valid), linear
+        return branch.Equations(residual, rows * self.scale, valid, u, linear.state_jacobian)
+
+    def stability(self, x: Array, loop: Array) -> tuple[float, float | None, ComplexArray]:
+        """See :meth:`~.branch.Branch.stability`; there is no target."""
+        energy, gradient = self.quantity(x, "energy")
+        return energy, None, branch.shell_eigenvalues(loop, gradient[: self.n])
+
+    def quantity(self, x: Array, name: str) -> tuple[float, Array]:
+        """See :meth:`~.branch.Branch.quantity`; any of :data:`~.branch.QUANTITIES` has a value.
+
+        X and the gradient are (n + 2,), with n the size of the section's state.
+        """
+        gradient = np.zeros(self.n + 2)
+        if name != "energy":
+            gradient[_COORDINATE[name]] = 1.0
+            return float(x[_COORDINATE[name]]), gradient
+        z = x[: self.n]
+        gradient[: self.n], gradient[-1] = energy_gradient(self.section, self.parameters, z, x[-1])
+        return float(self.section.energy(self.parameters, z, x[-1])), gradient
 
 
 def energy_gradient(
@@ -175,48 +158,30 @@ class ControlledFamily(branch.Branch):
 
     def equations(self, x: Array) -> branch.Equations:
         """Residual (n,) and Jacobian of z = P(z, u(z, target))."""
-        z, target = x[:-1], float(x[-1])
-        linear, closed, _ = self._closed(x)
-        valid = linear.outcome is Outcome.SECTION
-        if not valid:
-            return branch.Equations(np.full(self.n, np.nan), np.zeros((self.n, self.n + 1)), valid)
+        n, z, target = self.n, x[:-1], float(x[-1])
+        u = self.policy(z, target)
+        linear = self.map.linearise(z, u)
+        steps = _DIFFERENCE * np.eye(n)
+        changes = [self.policy(z + e, target) - self.policy(z - e, target) for e in steps]
+        slope = np.column_stack(changes) / (2.0 * _DIFFERENCE)
+        loop = linear.state_jacobian + linear.control_jacobian @ slope
+        if linear.outcome is not Outcome.SECTION:
+            return branch.Equations(np.full(n, np.nan), np.zeros((n, n + 1)), False, u, loop)
         h = _DIFFERENCE * self.scale[-1]
         by_target = (self.policy(z, target + h) - self.policy(z, target - h)) / (2.0 * h)
-        rows = np.column_stack((closed - np.eye(self.n), linear.control_jacobian @ by_target))
+        rows = np.column_stack((loop - np.eye(n), linear.control_jacobian @ by_target))
         scale = self.scale[:-1]
-        return branch.Equations(
-            (linear.state - z) / scale, rows * self.scale / scale[:, None], valid
-        )
+        jacobian = rows * self.scale / scale[:, None]
+        return branch.Equations((linear.state - z) / scale, jacobian, True, u, loop)
 
-    def point(self, x: Array) -> branch.BranchPoint:
-        """The branch point at X (n + 1,); its tangent is oriented arbitrarily."""
-        _, closed, u = self._closed(x)
-        eigenvalues = np.linalg.eigvals(closed).astype(np.complex128)
-        p = self.map.parameters
-        return branch.BranchPoint(
-            x=x.copy(),
-            state=x[:-1].copy(),
-            controls=u,
-            energy=float(self.map.sections[0].energy(p, x[:-1])),
-            target=float(x[-1]),
-            eigenvalues=eigenvalues,
-            kind=branch.classify(eigenvalues, _NOISE),
-            tangent=branch.null_vector(self.equations(x).jacobian),
-        )
+    def stability(self, x: Array, loop: Array) -> tuple[float, float | None, ComplexArray]:
+        """See :meth:`~.branch.Branch.stability`."""
+        energy = float(self.map.sections[0].energy(self.map.parameters, x[:-1]))
+        return energy, float(x[-1]), np.linalg.eigvals(loop).astype(np.complex128)
 
     def quantity(self, x: Array, name: str) -> tuple[float, Array]:
         """See :meth:`~.branch.Branch.quantity`; the only quantity is the controller's target."""
         return float(x[-1]), np.eye(self.n + 1)[-1]
-
-    def _closed(self, x: Array) -> tuple[Linearisation, Array, Array]:
-        """The stride at X: linear map, (n, n) derivative of its end by z, u (NUM_SLOTS,)."""
-        z, target = x[:-1], float(x[-1])
-        u = self.policy(z, target)
-        linear = self.map.linearise(z, u)
-        steps = _DIFFERENCE * np.eye(self.n)
-        changes = [self.policy(z + e, target) - self.policy(z - e, target) for e in steps]
-        slope = np.column_stack(changes) / (2.0 * _DIFFERENCE)
-        return linear, linear.state_jacobian + linear.control_jacobian @ slope, u
 
 
 @checked

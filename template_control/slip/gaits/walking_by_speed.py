@@ -9,7 +9,6 @@ from importlib.resources import files
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from template_control.arrays import Array
 from template_control.checks.checked import checked
@@ -28,13 +27,10 @@ from template_control.slip.gaits.gait import (
     with_push_off,
 )
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import PADDED, VLO
+from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
 _HEIGHT, _RISE = 1, 2  # places in a VLO state
-_COLUMNS = np.array(
-    [PADDED + Slot.K_SC, PADDED + Slot.K_SD, PADDED + Slot.TOUCHDOWN_ANGLE, _HEIGHT]
-)
 NATURAL = np.array([0.1, 0.02, 0.005])
 """Changes of ln k, alpha [rad] and y / l0 that count alike: what "nearest" means."""
 
@@ -57,15 +53,16 @@ def nearest_gait(parameters: SlipParameters, vlo_speed: float, guess: Array) -> 
     x = np.array(guess, dtype=float)
     for _ in range(_STEPS):
         z, u = _stride(x, vlo_speed, weight, p.rest_length)
-        end, slopes, outcome = step.derivatives(z, u, _COLUMNS)
-        if outcome is not Outcome.SECTION:
+        end = step.linearise(z, u)
+        if end.outcome is not Outcome.SECTION:
             break
-        k, kinds = u[Slot.K_SC], slopes[[_RISE, _HEIGHT]]
-        slope = np.column_stack((k * kinds[:, :2].sum(axis=1), kinds[:, 2], kinds[:, 3]))
-        slope[:, 2] *= p.rest_length
-        slope[1, 2] -= p.rest_length
+        by_controls = end.control_jacobian[[_RISE, _HEIGHT]]
+        by_stiffness = u[Slot.K_SC] * by_controls[:, [Slot.K_SC, Slot.K_SD]].sum(axis=1)
+        by_height = end.state_jacobian[[_RISE, _HEIGHT], _HEIGHT] * p.rest_length
+        by_height[1] -= p.rest_length
+        slope = np.column_stack((by_stiffness, by_controls[:, Slot.TOUCHDOWN_ANGLE], by_height))
         units = np.array([unit, p.rest_length])
-        misses = np.array([end[_RISE], end[_HEIGHT] - z[_HEIGHT]]) / units
+        misses = np.array([end.state[_RISE], end.state[_HEIGHT] - z[_HEIGHT]]) / units
         scaled = slope / units[:, None] * NATURAL
         if not np.all(np.isfinite(scaled)):
             break
@@ -137,15 +134,15 @@ class Chain:
         p, unit = parameters, parameters.speed_unit
         wanted = mean_speed / unit
         knot = int(np.clip(np.searchsorted(self.mean_speed, wanted) - 1, 0, len(self.height) - 2))
-        ends = self.vlo_speed[[knot, knot + 1]]
+        ends = self.vlo_speed[knot : knot + 2]
 
         def surplus(speed: float) -> float:
             return self.gait(p, speed * unit).mean_speed / unit - wanted
 
-        misses = [surplus(float(end)) for end in ends]
-        if misses[0] * misses[1] >= 0.0:  # at a knot, to rounding
-            return self.gait(p, float(ends[np.argmin(np.abs(misses))]) * unit)
-        return self.gait(p, float(brentq(surplus, *ends, xtol=_XTOL)) * unit)
+        found = next(roots(surplus, ends, xtol=_XTOL), None)
+        if found is None:  # at a knot, to rounding
+            found = min(ends.tolist(), key=lambda end: abs(surplus(end)))
+        return self.gait(p, found * unit)
 
     def gaits(self, parameters: SlipParameters) -> GaitsBySpeed:
         """The chain's gaits of a template by their speed at VLO."""

@@ -176,7 +176,8 @@ def section_jacobian(
         j = columns[c]
         jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
         jacobian[3, c] = state[0, j]
-        jacobian[4:, c] = lengths[:, j]
+        for leg in range(3):
+            jacobian[4 + leg, c] = lengths[leg, j]
     return ended[0]
 
 

@@ -134,12 +134,7 @@ class SteadyRoute:
 
     @classmethod
     def of(cls, gait: PeriodicGait, automaton: Automaton = AUTOMATON) -> SteadyRoute:
-        """The route that keeps a gait.
-
-        Args:
-            gait: any whose stride returns to its state.
-            automaton: that its stride is of.
-        """
+        """The route that keeps a gait, whose stride is one of the automaton's."""
         return cls(gait.parameters, gait.stride, gait.state, automaton=automaton)
 
     def reset(self) -> None:

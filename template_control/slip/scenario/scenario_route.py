@@ -186,14 +186,12 @@ class ScenarioRoute:
         speed = here.wanted(segment, now + ahead)
         if segment.gait == STAND:
             speed = _SLOWED * self._unit if kind == StrideKind.CHANGE_SPEED else 0.0
-        runs = segment.gait == "run"
-        target = (
-            (speed, self._apex_height(speed))
-            if runs
-            else (speed, self._vlo_height(speed), s.vlo[1])
-        )
         if _leads_to(kind) is REST:
-            target = (0.0, s.stand_height, 0.0)
+            target = [0.0, s.stand_height, 0.0]
+        elif segment.gait == "run":
+            target = [speed, self._apex_height(speed)]
+        else:
+            target = [speed, self._vlo_height(speed), s.vlo[1]]
         then = self._then(kind, here.index)
         goal = StrideGoal(self._named(kind), np.array(target), speed, here.index, then)
         return replace(here, last=(kind, now)), goal

@@ -90,6 +90,13 @@ def test_walk_to_run_reaches_an_apex(kind, speed):
     np.testing.assert_allclose(mapped.state, [speed, 0.98], atol=0.02)
 
 
+def test_a_solution_does_not_depend_on_earlier_guesses():
+    controller, z, target = WalkToRun(P), transitions.WRT_STATE, [1.9, 0.98]
+    alone = controller.solve(z, target)
+    controller.solve(z, target, transitions.WRT_CONTROLS)
+    np.testing.assert_array_equal(controller.solve(z, target).controls, alone.controls)
+
+
 def test_simplified_walk_to_run_ignores_the_rear_leg():
     z, u = transitions.WRT_STATE, controls(np.radians(71.94), 16.5e3, 16.5e3, 25e3, 90e3)
     simplified = ReturnMap(P, "wr*")
