@@ -15,7 +15,7 @@ from template_control.checks.checked import checked
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Reset
 from template_control.slip.dynamics.kernel import new_scratch, plain, record_stride
 from template_control.slip.dynamics.model import Kernel, node_kernel
 from template_control.slip.parameters import SlipParameters
@@ -124,11 +124,7 @@ def controls(
     Raises:
         ParameterError: if the angle is not in (0, pi) or a stiffness is negative or NaN.
     """
-    u = np.zeros(NUM_SLOTS)
-    u[Slot.TOUCHDOWN_ANGLE] = touchdown_angle
-    u[Slot.K_SC], u[Slot.K_SD] = k_sc, k_sd
-    u[Slot.K_SC_WR], u[Slot.K_SD_WR] = k_sc_wr, k_sd_wr
-    u[Slot.K_PUSH] = k_push
+    u = np.array([touchdown_angle, k_sc, k_sd, k_sc_wr, k_sd_wr, k_push], dtype=float)
     if not 0.0 < touchdown_angle < np.pi:
         raise ParameterError(
             f"touchdown angle is {touchdown_angle!r} rad: give one between 0 and pi"

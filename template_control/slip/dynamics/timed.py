@@ -88,26 +88,20 @@ def timed_stride(
     paths = np.zeros((2, len(pieces), ORDER + 1))
     for i, piece in enumerate(pieces):
         paths[:, i, :TERMS] = piece.coefficients
-    number = automaton.index[node]
-    meta = np.array(
-        [
-            (begin, piece.duration, number, *toes, np.nan, np.nan)
-            for begin, piece in zip(starts, pieces, strict=True)
-        ]
-    )
+    meta = np.full((len(pieces), 7), np.nan)
+    meta[:, :2] = np.column_stack((starts, durations))
+    meta[:, 2], meta[:, 3:5] = automaton.index[node], toes
     (x, dx, _), (y, dy, _) = pieces[-1].end()
     state = np.array([x, y, dx, dy])
-    event = FiredEvent(
-        float(durations.sum()), edge.event, node, str(edge.target), state, edge.reset
-    )
+    duration, after = float(durations.sum()), str(edge.target)
+    event = FiredEvent(duration, edge.event, node, after, state, edge.reset)
     exchanged = edge.reset in (Reset.SHIFT, Reset.SWAP)
-    after = np.array(toes[::-1] if exchanged else toes)
     return Stride(
         outcome=Outcome.SECTION,
-        node=str(edge.target),
+        node=after,
         state=state,
-        toes=after,
-        duration=event.time,
+        toes=np.array(toes[::-1] if exchanged else toes),
+        duration=duration,
         events=(event,),
         cx=paths[0],
         cy=paths[1],
