@@ -195,8 +195,13 @@ class Automaton:
     def successor(self, name: str, event: Event) -> str:
         """Name of the node that follows ``name`` when ``event`` fires.
 
-        A KeyError if there is no node ``name``, or ``event`` is no way out of it, or ends the
-        stride in failure.
+        Args:
+            name: of the node that is left.
+            event: the guard of one of its edges.
+
+        Raises:
+            KeyError: if there is no node ``name``, or ``event`` is no way out of it, or ends the
+                stride in failure.
         """
         edge = self.node(name).edge(event)
         if edge is None or isinstance(edge.target, Outcome):

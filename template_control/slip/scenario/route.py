@@ -134,7 +134,12 @@ class SteadyRoute:
 
     @classmethod
     def of(cls, gait: PeriodicGait, automaton: Automaton = AUTOMATON) -> SteadyRoute:
-        """The route that keeps a gait, whose stride is one of the automaton's."""
+        """The route that keeps a gait.
+
+        Args:
+            gait: any whose stride returns to its state.
+            automaton: that its stride is of.
+        """
         return cls(gait.parameters, gait.stride, gait.state, automaton=automaton)
 
     def reset(self) -> None:
