@@ -37,6 +37,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.least_squares import bounded_step
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
+    EXACT,
     REAR_BOTTOM,
     RESULTS,
     Derivatives,
@@ -249,10 +250,10 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
         if i == 0:
             # The present state is what it is.
             found = Derivatives(result, by_control)
-            section_jacobian(p.kernel, None, plan.states[i], u, p.columns[STATES:], work, found)
+            section_jacobian(p.kernel, EXACT, plan.states[i], u, p.columns[STATES:], work, found)
         else:
             found = Derivatives(result, by_both)
-            section_jacobian(p.kernel, None, plan.states[i], u, p.columns, work, found)
+            section_jacobian(p.kernel, EXACT, plan.states[i], u, p.columns, work, found)
         skip = 0 if i == 0 else STATES
         _chain(found.jacobian, 0, skip, plan, i, state, following)
         _chain(found.jacobian, REAR_BOTTOM, skip, plan, i, state, lengths)
@@ -288,7 +289,7 @@ def _step(p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, i: in
     """Write the state after step ``i``; False where the template does not complete it."""
     u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
     slots_of(plan, i, u)
-    if one_stride(p.kernel, None, plan.states[i], u, work.scratch, result) != 0:
+    if one_stride(p.kernel, EXACT, plan.states[i], u, work.scratch, result) != 0:
         return False
     for j in range(STATES):
         plan.states[i + 1, j] = result[j] + aim.offset[j]

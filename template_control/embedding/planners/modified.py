@@ -17,7 +17,6 @@ from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import GaitFamily, WalkingGait, without_push_off
 from template_control.slip.gaits.walking_by_speed import other_walks
-from template_control.slip.maps.return_map import closed_form
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 
 Array = NDArray[np.float64]
@@ -86,7 +85,7 @@ class ModifiedPlanner(Planner):
         search = min(max(nominal, low), high), low, high, p.leg_stiffness
         aim = Aim(self.gait.vlo, self._stiffness)
         outcome, alpha, kappa_2, residual = search_angle(
-            self._kernel, closed_form(o.map_kind), z, aim, search, self._scratch, predicted
+            self._kernel, int(o.map_kind), z, aim, search, self._scratch, predicted
         )
         controls = self.gait.controls.copy()
         controls[Slot.TOUCHDOWN_ANGLE], controls[Slot.K_SD] = alpha, kappa_2

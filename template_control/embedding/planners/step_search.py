@@ -17,11 +17,10 @@ from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
 from template_control.slip.dynamics.kernel import Scratch
 from template_control.slip.dynamics.model import Kernel
-from template_control.slip.maps.return_map import RESULTS, one_stride
+from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
 
 _FAST = np.int64(MapKind.IMPROVED)  # Numba would compile once more for a literal int
 _FLIES = int(Outcome.UNWANTED_FLIGHT)
-_ON_EXACT, _ON_FAST = np.bool_(True), np.bool_(False)  # Numba would compile once more for a literal
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 
@@ -137,10 +136,10 @@ def linear(law: Law, z: Array, u: Array) -> None:
 
 
 @compiled
-def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -> int:
+def step(law: Law, kind: int, s: Scratch, z: Array, u: Array, result: Array) -> int:
     """Take one walking step from ``z`` (3,), and add the robot's offset to where it ends.
 
-    ``exact`` tries the exact map, else the improved closed form. ``u`` (c,) is alpha [rad],
+    ``kind`` is the map's, as of :func:`.one_stride`. ``u`` (c,) is alpha [rad],
     stiffnesses/k0; ``result`` (RESULTS,) means nothing where the returned Outcome's value is not
     SECTION.
     """
@@ -150,10 +149,7 @@ def step(law: Law, exact: bool, s: Scratch, z: Array, u: Array, result: Array) -
     controls = np.zeros(NUM_SLOTS)
     for i in range(u.shape[0]):
         controls[law.slots[i]] = u[i] if i == 0 else u[i] * law.stiffness
-    if exact:
-        outcome = one_stride(law.kernel, None, z, controls, s, result)
-    else:
-        outcome = one_stride(law.kernel, _FAST, z, controls, s, result)
+    outcome = one_stride(law.kernel, kind, z, controls, s, result)
     for i in range(3):
         result[i] += law.offset[i]
     return outcome
@@ -195,16 +191,14 @@ def cost_to_go(target: Array, cost: Array, z: Array) -> float:
 
 
 @compiled
-def price(
-    law: Law, exact: bool, s: Scratch, z: Array, u: Array, limit: float, first: Array
-) -> float:
+def price(law: Law, kind: int, s: Scratch, z: Array, u: Array, limit: float, first: Array) -> float:
     """Cost of taking ``u`` at ``z``; arguments as for :func:`step`.
 
     ``limit`` is a cost known to be too much: the second step is not looked at beyond it. ``first``
     (3,) is overwritten with the state after one step.
     """
     result, u2 = np.empty(RESULTS), np.empty(u.shape[0])
-    if step(law, exact, s, z, u, result) != 0:
+    if step(law, kind, s, z, u, result) != 0:
         return 2.0 * FALL_PRICE
     copy(result, first)
     here = cost_to_go(law.target, law.cost, first)
@@ -223,7 +217,7 @@ def price(
                 break
             copy(law.second_steps[i], u2)
             bounded(law, first, u2)
-        if step(law, exact, s, first, u2, result) == 0:
+        if step(law, kind, s, first, u2, result) == 0:
             cost = cost_to_go(law.target, law.cost, result) + knee_load(law, first, u2, result)
             best = min(best, cost + share)
     return best
@@ -265,7 +259,7 @@ def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """
     controls = best.shape[0]
     u, end, centre = np.empty(controls), np.empty(3), np.empty(controls)
-    cheapest = price(law, _ON_EXACT, s, z, best, np.inf, first)
+    cheapest = price(law, EXACT, s, z, best, np.inf, first)
     coarse, fine = 1, _FINE[0] * _FINE[1] + 2 * (controls - 2)
     for j in range(controls):
         coarse *= _COARSE[j]
@@ -278,9 +272,9 @@ def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
             else:
                 _fine(centre, widths, i, u)
             bounded(law, z, u)
-            if price(law, _ON_FAST, s, z, u, cheapest, end) >= cheapest:
+            if price(law, _FAST, s, z, u, cheapest, end) >= cheapest:
                 continue
-            cost = price(law, _ON_EXACT, s, z, u, cheapest, end)
+            cost = price(law, EXACT, s, z, u, cheapest, end)
             if cost < cheapest:
                 cheapest = cost
                 copy(u, best)
@@ -300,7 +294,7 @@ def choose(law: Law, s: Scratch, z: Array, u: Array, first: Array) -> tuple[floa
     overwritten with the state after the step.
     """
     linear(law, z, u)
-    cost = price(law, _ON_EXACT, s, z, u, np.inf, first)
+    cost = price(law, EXACT, s, z, u, np.inf, first)
     trusted = cost < law.trusted_price
     left = cost_to_go(law.target, law.cost, first)
     settled = _SETTLED_PRICE if u.shape[0] > 3 else np.inf

@@ -43,7 +43,7 @@ class Aim(NamedTuple):
 @compiled
 def modified_step(
     kernel: Kernel,
-    kind: int | None,
+    kind: int,
     z: Array,
     aim: Aim | None,
     controls: Array,
@@ -78,7 +78,7 @@ def modified_step(
 @compiled
 def search_angle(
     kernel: Kernel,
-    kind: int | None,
+    kind: int,
     z: Array,
     aim: Aim,
     search: tuple[float, float, float, float],
@@ -125,7 +125,7 @@ def search_angle(
 
 @compiled
 def modified_jacobian(
-    at: tuple[Kernel, int | None, Array],
+    at: tuple[Kernel, int, Array],
     aim: Aim | None,
     controls: Array,
     columns: IntArray,

@@ -16,7 +16,7 @@ from numba import types
 
 from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled, inner_by_type
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
 from template_control.slip.control.modified_walking import Aim, modified_jacobian, modified_step
 from template_control.slip.dynamics.model import Kernel
@@ -36,7 +36,7 @@ class StrideEnd(NamedTuple):
     """
 
     kernel: Kernel
-    kind: int | None
+    kind: int
     start: Array
     ends: IntArray  # (m,) which of the map's results are its end
     work: MapWorkspace
@@ -66,7 +66,7 @@ def rest(
     x, y, dx, dy = state
     start, end = np.array([dx, y, dy, x, *toes]), simulator.automaton.sections(node)[1]
     ends = np.arange(section_of(end).dimension)
-    return StrideEnd(simulator.kernel(node), None, start, ends, work)
+    return StrideEnd(simulator.kernel(node), int(MapKind.EXACT), start, ends, work)
 
 
 class StrideProblem(NamedTuple):

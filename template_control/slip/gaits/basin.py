@@ -20,7 +20,7 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, StrideKind
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
-from template_control.slip.maps.return_map import RESULTS, one_stride
+from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
@@ -36,7 +36,7 @@ def _for_each(name: str, rows: Array, count: int) -> Array:
     """One row, or ``count`` of them, as ``count`` rows."""
     if rows.ndim > 2 or (rows.ndim == 2 and len(rows) != count):
         raise ParameterError(f"{name} has shape {rows.shape}: give one row, or {count} of them")
-    return np.ascontiguousarray(np.broadcast_to(rows, (count, rows.shape[-1])))
+    return np.array(np.broadcast_to(rows, (count, rows.shape[-1])))
 
 
 @checked
@@ -81,7 +81,7 @@ def _steps(
     """Number of steps from ``z``, overwritten by the last VLO, and whether they lead to y, phi."""
     early = middle = late = 0.0
     for step in range(limit):
-        if one_stride(kernel, None, z, controls, scratch, result) != Outcome.SECTION:
+        if one_stride(kernel, EXACT, z, controls, scratch, result) != Outcome.SECTION:
             return step, False
         for i in range(3):
             z[i] = result[i]

@@ -24,6 +24,8 @@ from template_control.slip.parameters import SlipParameters
 
 # Numba would compile the stride once more for a literal.
 _LAST_ONLY, _RECORDED = np.bool_(False), np.bool_(True)
+EXACT = np.int64(MapKind.EXACT)
+"""The exact map, for compiled code."""
 _DIFFERENCE = 3e-6  # relative; leaves 1e-11 of the third derivative and 1e-9 of rounding
 
 RESULTS = 7
@@ -53,11 +55,6 @@ class Derivatives(NamedTuple):
     jacobian: Array
 
 
-def closed_form(kind: MapKind) -> int | None:
-    """``kind`` as the compiled maps take it; None for the exact one is compiled by itself."""
-    return None if kind is MapKind.EXACT else int(kind)
-
-
 @inner
 def _begin(z: Array, scratch: Scratch) -> None:
     """Put a stride's start over the origin, where both toes are, or where it says."""
@@ -80,7 +77,7 @@ def _conclude(scratch: Scratch, result: Array) -> None:
 @inner
 def one_stride(
     kernel: Kernel,
-    kind: int | None,
+    kind: int,
     z: Array,
     controls: Array,
     scratch: Scratch,
@@ -90,10 +87,10 @@ def one_stride(
 
     ``z`` (3,) are dx/dt, y, dy/dt at the section [m/s, m, m/s], dy/dt is 0 at apex; within a stride
     (6,): also x of CoM, rear and front toe [m]. ``result`` (RESULTS,) is overwritten; lengths are
-    NaN of legs that had no bottom or touchdown. ``kind`` is from :func:`closed_form`.
+    NaN of legs that had no bottom or touchdown. ``kind`` is a MapKind's value.
     """
     _begin(z, scratch)
-    if kind is None:
+    if kind == EXACT:
         state, toes = scratch.state, scratch.toes
         outcome = run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
     else:
@@ -105,7 +102,7 @@ def one_stride(
 @compiled
 def map_many(
     kernel: Kernel,
-    kind: int | None,
+    kind: int,
     z: Array,
     controls: Array,
     scratch: Scratch,
@@ -151,7 +148,7 @@ def _differences(
 @compiled
 def section_jacobian(
     kernel: Kernel,
-    kind: int | None,
+    kind: int,
     z: Array,
     controls: Array,
     columns: IntArray,
@@ -164,7 +161,7 @@ def section_jacobian(
     form to about 1e-9 of the value (central differences). ``columns`` (c,) are what to
     differentiate by: 0 to 2 the state, 3 + slot the controls.
     """
-    if kind is not None:
+    if kind != EXACT:
         return _differences(kernel, kind, z, controls, columns, work, found)
     scratch, tangents = work
     _begin(z, scratch)
@@ -250,7 +247,7 @@ class ReturnMap:
         begin, end = automaton.sections(start)
         self.sections = section_of(begin), section_of(end)
         self.dimensions = self.sections[0].dimension, self.sections[1].dimension
-        self.kernel = stride_kernel(parameters, stride, automaton), closed_form(self.kind)
+        self.kernel = stride_kernel(parameters, stride, automaton), int(self.kind)
         self.work = new_workspace()
 
     def evaluate(self, z: Array, u: Array) -> tuple[Array, Outcome]:

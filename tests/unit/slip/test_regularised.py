@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import Outcome, Slot
+from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.least_squares import Search, bounded_step
 from template_control.slip.control.stride_solver import (
     LEAST_PULL,
@@ -106,7 +106,7 @@ def rest_of_a_step(controls, time=0.3):
     at = np.searchsorted(stride.meta[:, 0], time, side="right") - 1
     node, toes = stride.nodes(time)[0], stride.meta[at, 3:5]
     state = np.array([dx, y, dy, x, *toes])
-    rest = StrideEnd(simulator.kernel(node), None, state, np.arange(3), new_workspace())
+    rest = StrideEnd(simulator.kernel(node), int(MapKind.EXACT), state, np.arange(3), new_workspace())
     return rest, simulator.run(node, [x, y, dx, dy], controls, toes)
 
 
