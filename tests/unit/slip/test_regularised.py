@@ -106,7 +106,9 @@ def rest_of_a_step(controls, time=0.3):
     at = np.searchsorted(stride.meta[:, 0], time, side="right") - 1
     node, toes = stride.nodes(time)[0], stride.meta[at, 3:5]
     state = np.array([dx, y, dy, x, *toes])
-    rest = StrideEnd(simulator.kernel(node), int(MapKind.EXACT), state, np.arange(3), new_workspace())
+    rest = StrideEnd(
+        simulator.kernel(node), int(MapKind.EXACT), state, np.arange(3), new_workspace()
+    )
     return rest, simulator.run(node, [x, y, dx, dy], controls, toes)
 
 
