@@ -96,8 +96,7 @@ def join(strides: Sequence[Stride], time_unit: float = 1.0) -> TemplatePath:
     events, resets = [], []
     row, offset = 0, 0.0
     for stride in strides:
-        if row:
-            meta[row : row + len(stride.meta), 0] += offset
+        meta[row : row + len(stride.meta), 0] += offset
         for time, event, _, _, _, reset in stride.events:
             events.append((offset + time, event))
             resets.append((offset + time, reset))
@@ -147,18 +146,18 @@ def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
 
 
 @compiled
-def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Array) -> int:
+def sample(curve: tuple[Array, Array, Array], time: float, out: Array) -> int:
     """Write the path at ``time`` into out (6,): x from the toe, y, and their two derivatives.
 
     Args:
-        coefficients, meta, look: of a :class:`Curve`.
+        curve: a :class:`Curve`, or its plain tuple.
         time: on the path [s].
         out: overwritten [m, m/s, m/s^2].
 
     Returns:
         The segment.
     """
-    row = 0
+    (coefficients, meta, look), row = curve, 0
     while row + 1 < meta.shape[0] and meta[row + 1, 0] <= time:
         row += 1
     # Past either end the path goes on along its last polynomial for a moment, then stops.
@@ -171,18 +170,17 @@ def sample(coefficients: Array, meta: Array, look: Array, time: float, out: Arra
 
 @compiled
 def at_direction(
-    coefficients: Array, meta: Array, look: Array, x: float, y: float, guess: float, out: Array
+    curve: tuple[Array, Array, Array], x: float, y: float, guess: float, out: Array
 ) -> tuple[float, int]:
     """Time at which the template's CoM is in the direction of (x, y) [s], and its segment.
 
     ``x``, ``y`` are the robot's CoM relative to its rear stance foot [m]; ``guess`` is a time close
     to the answer [s]. The path there is written into ``out`` (6,), as by :func:`sample`.
     """
-    last = meta[meta.shape[0] - 1]
-    end, leap = last[0] + last[1], look[2]
-    t = guess
+    _, meta, look = curve
+    end, leap, t = meta[-1, 0] + meta[-1, 1], look[2], guess
     for _ in range(_NEWTON):
-        sample(coefficients, meta, look, t, out)
+        sample(curve, t, out)
         slope = out[2] * y - out[3] * x
         if slope < 1e-6:
             break
@@ -190,19 +188,7 @@ def at_direction(
         t = min(max(t + min(max(step, -leap), leap), 0.0), end)
         if abs(step) < 1e-10:
             break
-    return t, sample(coefficients, meta, look, t, out)
-
-
-# Largest normal force of a foot that is about to lift off, over the template's. It is over 1, as
-# the robot's forces are not exactly the template's.
-_UNLOADED = 1.3
-_FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and the QP some room
-
-
-@compiled
-def unload_cap(template_force: float, weight: float) -> float:
-    """Largest normal force of a foot that is about to lift off [N]: near the template leg's."""
-    return _UNLOADED * max(template_force, 0.0) + _FLOOR * weight
+    return t, sample(curve, t, out)
 
 
 @compiled
@@ -294,16 +280,15 @@ def move_clock(
     ``s`` is of ``SENSED``, ``mode`` of ``MODE``, ``want`` of ``REFERENCES``; ``motion`` is dx/dt of
     the CoM [m/s], and the time since the last tick [s].
     """
-    speed, dt = motion
-    coefficients, meta, look = curve
+    (speed, dt), (_, meta, look) = motion, curve
     x, y = s.state[0] + path.offset - s.toes[0], s.state[1]
     # Since the last tick, unless the path begins at this one. A direction needs a guess only.
     guess = path.time + (0.0 if path.fresh and not mode.by_direction else dt)
     path.fresh = 0
     if mode.by_direction:
-        path.time, row = at_direction(coefficients, meta, look, x, y, guess, want.com)
+        path.time, row = at_direction(curve, x, y, guess, want.com)
     else:
-        path.time, row = guess, sample(coefficients, meta, look, guess, want.com)
+        path.time, row = guess, sample(curve, guess, want.com)
     path.offset += (s.state[2] - speed) * dt
     toe, forces = look[0], path.forces
     leg_forces(meta[row], toe, want.com, path.body, forces)

@@ -190,24 +190,19 @@ def feel_slides(s: Any, standing: NDArray[np.uint8], force: Array, speed: Array,
     """
     before, level = s.coefficient, force.shape[1] - 1
     for foot in range(force.shape[0]):
-        if not standing[foot]:
-            s.standing[foot] = 0.0
-            _end(s, foot)
-            continue
-        s.standing[foot] += dt
         load = force[foot, level]
-        if load < s.least:
+        s.standing[foot] = s.standing[foot] + dt if standing[foot] else 0.0
+        if standing[foot] and load < s.least:
             continue
-        if _slides_on(s, foot, force, speed):
-            s.time[foot] += dt
-            s.along[foot] += _size(force, foot, level)
-            s.normal[foot] += load
-            if s.time[foot] >= s.duration:
-                ratio = max(s.along[foot] / s.normal[foot], s.lowest)
-                if ratio < (1.0 - _DOUBT) * s.coefficient:
-                    s.coefficient = ratio
-        else:
-            _end(s, foot)
+        if not standing[foot] or not _slides_on(s, foot, force, speed):
+            s.time[foot] = s.along[foot] = s.normal[foot] = 0.0
+            continue
+        s.time[foot] += dt
+        s.along[foot] += _size(force, foot, level)
+        s.normal[foot] += load
+        ratio = max(s.along[foot] / s.normal[foot], s.lowest)
+        if s.time[foot] >= s.duration and ratio < (1.0 - _DOUBT) * s.coefficient:
+            s.coefficient = ratio
     return s.coefficient != before
 
 
@@ -228,12 +223,6 @@ def _size(vectors: Array, foot: int, level: int) -> float:
     if level == 1:
         return abs(vectors[foot, 0])
     return hypot(vectors[foot, 0], vectors[foot, 1])
-
-
-@compiled
-def _end(s: Any, foot: int) -> None:
-    """The foot slides no longer."""
-    s.time[foot] = s.along[foot] = s.normal[foot] = 0.0
 
 
 def set_friction(

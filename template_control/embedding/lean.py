@@ -7,7 +7,6 @@ the trunk, and its mean settles off the reference: the mean is regulated from st
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -62,11 +61,7 @@ class Lean(Checked):
 
     def at(self, speed: float) -> float:
         """The mean pitch [rad] at a speed [m/s]."""
-        after = bisect_right(self.speeds, speed)
-        if after in (0, len(self.speeds)):
-            return self.pitches[max(after - 1, 0)]
-        (near, far), (low, high) = (a[after - 1 : after + 1] for a in (self.speeds, self.pitches))
-        return low + (high - low) / (far - near) * (speed - near)
+        return float(np.interp(speed, self.speeds, self.pitches))
 
 
 def _leans() -> dict[str, Lean]:

@@ -1,10 +1,9 @@
 """Learners of a stride: when each of them learns; load and momentum of the robot, by feedback.
 
-A robot's step adds something systematic to the template's. The planner can cancel two of its
-three directions; the third, which is mostly forward speed, it cannot: from a symmetric gait, by
-the template's mirror symmetry, no touchdown angle and no leg stiffness changes it, and a gait
-can bear it only with dy/dt at VLO. In single stance no force can either, as a point foot cannot
-change the momentum about itself. In double stance the forces of two feet can.
+A robot's step adds something systematic to the template's. The planner can cancel two of its three
+directions, but not the third, mostly forward speed: near a symmetric gait, by the template's mirror
+symmetry, no touchdown angle and no leg stiffness changes it. In single stance no force can either,
+as a point foot cannot change the momentum about itself; in double stance the forces of two can.
 """
 
 from __future__ import annotations
@@ -14,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.compiled import compiled
 from template_control.embedding.com_path import TemplatePath
 from template_control.embedding.contacts import set_friction
 from template_control.embedding.lean import TrunkLean
@@ -51,30 +49,13 @@ _LARGEST_DRIFT = 0.01  # a larger drift counts as this much: a push is no drift
 TRIM_BOUND = 0.03
 """Of the trim's acceleration over g."""
 
-LOAD = np.dtype(
-    [
-        ("sum", np.float64),  # of the vertical feedback over the stride [m/s]
-        ("time", np.float64),  # over which it was summed [s]
-    ],
-    align=True,
-)
-"""Load estimate, within a stride."""
-
-
-@compiled
-def observe_load(load: Any, feedback: float, dt: float) -> None:
-    """Add a tick's feedback part of the CoM's vertical acceleration [m/s^2], for ``dt`` [s]."""
-    load.sum += feedback * dt
-    load.time += dt
-
 
 class LoadEstimate:
     """Ratio of the real to the modelled weight, ``factor``, 1 at first.
 
-    Over a whole step the feedback part of the CoM's vertical acceleration averages to
-    nothing, unless forces computed with the model's mass do not carry the robot. All joint
-    torques are then scaled by the factor learnt here; the model itself stays nominal.
-    Feedback is measured in units of the model's ``gravity`` [m/s^2]; ``data`` (1,) are of ``LOAD``.
+    Over a whole step the feedback part of the CoM's vertical acceleration averages to nothing,
+    unless forces computed with the model's mass do not carry the robot. All joint torques are
+    scaled by the factor. ``gravity`` is the model's [m/s^2]; ``data`` (1,) are of ``LOAD``.
     """
 
     _sum, _time = Number("sum"), Number("time")

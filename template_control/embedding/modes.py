@@ -134,6 +134,7 @@ def set_guards(data: Any, parameters: SlipParameters, options: GuardOptions) -> 
     data["overstretch"] = _OVERSTRETCH * p.rest_length
 
 
+_FLAGS = ("momentum_speed", "rolling_contact", "trim_momentum", "follow_curve", "settles")
 MODE = np.dtype(
     [
         ("node", _I),  # its number on the automaton
@@ -146,11 +147,7 @@ MODE = np.dtype(
         ("placed", _I, (_MOST_EDGES,)),  # the leg that each puts on the ground; -1: none
         ("passed", _I, (_MOST_EDGES,)),  # whether each has been taken where VLO has come
         ("by_direction", _I),  # whether the clock is the direction of the CoM, not the time
-        ("momentum_speed", _I),  # flags of the phase's entry in the table
-        ("rolling_contact", _I),
-        ("trim_momentum", _I),
-        ("follow_curve", _I),
-        ("settles", _I),
+        *((flag, _I) for flag in _FLAGS),  # of the phase's entry in the table
         ("estimate_load", _I),  # and a task gives the feedback
         ("unloads", _I, (2,)),  # whether each leg has its normal force kept near the template's
         ("unloading", _F),  # time over which it gives its load up before it lifts off [s]; 0: none
@@ -191,9 +188,8 @@ def _mode(node: Node, automaton: Automaton, control: PhaseControl, nv: int, trim
         # At the bottom of a leg that is let go soon the robot's guard may graze zero.
         data["passed"][i] = edge.reset is Reset.NONE and then.edge(Event.VLO) is not None
     data["by_direction"] = control.clock is Clock.DIRECTION
-    flags = ("momentum_speed", "rolling_contact", "trim_momentum", "follow_curve", "settles")
-    for name in flags:
-        data[name] = getattr(control, name)
+    for flag in _FLAGS:
+        data[flag] = getattr(control, flag)
     data["estimate_load"] = control.estimate_load and tasks.follows_com
     data["unloads"][list(control.unload_legs)] = 1
     data["unloading"] = control.unloading

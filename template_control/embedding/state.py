@@ -103,9 +103,8 @@ class TemplateState:
 class StateObserver:
     """Observer of the robot's state on the template's ground, that of the foot that landed last.
 
-    Every tick updates the robot's model, and others write ``acceleration`` (2,), wanted of the CoM
-    [m/s^2], and ``mode`` (1,), of ``MODE``. ``data`` (1,), of ``SENSED``, explains the other
-    numbers; ``now`` was read last.
+    Others write ``acceleration`` (2,), wanted of the CoM [m/s^2], and ``mode`` (1,), of ``MODE``;
+    ``data`` (1,) is of ``SENSED``, and ``now`` was read last.
     """
 
     ground = Number("ground")
@@ -191,9 +190,8 @@ class Snapshot:
         template_com, template_velocity: (2,) of the template at the robot's phase [m, m/s].
         template_force: (2, 2) its leg forces, rear and front [N].
         swing_reference: (2, 2) position of each foot's reference, NaN where it has none [m].
-        sway: (2,) y of the CoM from the rear foot and dy/dt, in the heading frame; dy/dt has the
-            angular momentum about the CoM where the phase's forward speed has it [m, m/s]. Zero in
-            the plane.
+        sway: (2,) y of the CoM from the rear foot and dy/dt, with the angular momentum where the
+            phase's forward speed has it [m, m/s]; zero in the plane.
         side_reference: (2,) y of each foot's reference, NaN where it has none [m]; zero in the
             plane.
     """

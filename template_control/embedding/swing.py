@@ -1,15 +1,11 @@
 """Swing of the feet in the air: shapes, references, and which foot plays which leg.
 
-A foot follows a quintic to its next foothold, re-aimed at every tick: from the present reference
-(position, velocity, acceleration) to the foothold in the time the template still needs to get
-there, so a foothold or a touchdown time that moves leaves no step in the reference. The foot rises
-to its clearance early, keeps it while it travels, and comes down late, with a small downward speed
-at the end, so that it meets the ground for certain. Unknown ground is then met from above. A foot
-that meets a wall all the same goes up along it.
-
-Which shape a robot walks with depends on its legs. A foot that is high while it travels clears
-unknown ground, rises faster and comes down faster, and the rest of the robot moves by as much as
-the leg is heavy: only light legs swing high.
+A foot follows a quintic to its next foothold, re-aimed at every tick from the present reference in
+the time the template still needs to get there: a foothold or a touchdown time that moves leaves no
+step in the reference. The foot rises to its clearance early, keeps it while it travels, and comes
+down late, so that unknown ground is met from above. One that meets a wall all the same goes up
+along it. A high foot rises and comes down faster, and the rest of the robot moves by as much as the
+leg is heavy: only light legs swing high.
 """
 
 from __future__ import annotations
@@ -40,12 +36,11 @@ class SwingOptions(Checked):
         rise: share of the swing in which the foot rises to its clearance.
         descent: the foot keeps its clearance until this long before touchdown [s]; None: it comes
             down as soon as it is up.
-        landing_speed: downward speed at touchdown [m/s]. The foot meets the ground for certain
-            and not hard.
+        landing_speed: downward at touchdown [m/s]: the ground is met for certain, and not hard.
         horizon: below this time to go [s] the path is no longer re-aimed; the quintic's
             accelerations would grow beyond bounds.
-        early: the foot is above its foothold this long before touchdown [s], so that it
-            comes down at rest relative to the ground.
+        early: the foot is above its foothold this long before touchdown [s], and comes down at rest
+            relative to the ground.
         late: a foot that meets a wall less than this before its touchdown [s] is set down before
             it; earlier it goes up and over.
         near: so is one that comes down already with less than this to go to its foothold [m]: it
@@ -55,9 +50,8 @@ class SwingOptions(Checked):
         drop_acceleration: downwards, of a foot that finds no ground where it is due [m/s^2].
         leg_share: the foot is kept within this share of the leg's length from the hip; a knee
             that goes straight hits its stop with tens of kilonewtons.
-        lag: the reference waits for a foot that is further from it than this, forward or back [m]:
-            one that hips at their limits could not follow is not caught up with at once; None: it
-            does not.
+        lag: the reference waits for a foot that is further from it than this, forward or back [m],
+            as hips at their limits cannot catch up at once; None: it does not.
         start: acceleration forward with which it begins, over the way to go by the time for it
             squared. A quintic from 0 has its largest, 5.8, after a fifth of the time; with 6 from
             the first moment on it is never faster than 1.74 times the mean, instead of 1.88.
@@ -230,12 +224,9 @@ def spread_contacts(f: Any, foot: int, r: Any, yaw: float, duration: float, offs
     for i in range(r.members[foot]):
         contact = r.group[foot, i]
         x, y = f.spread[contact, 0], f.spread[contact, 1]
+        places = c * x - sine * y, c * y + sine * x, 0.0
         for axis in range(3):
-            place = 0.0
-            if axis == 0:
-                place = c * x - sine * y
-            elif axis == 1:
-                place = c * y + sine * x
+            place = places[axis]
             off = f.lifted[contact, axis] - place
             offset[contact, axis, 0] = place + fade * off
             offset[contact, axis, 1], offset[contact, axis, 2] = rate * off, bend * off
@@ -252,8 +243,8 @@ def begin_swing(
 ) -> None:
     """Begin a swing of a shape, which it keeps, with the foot's position and velocity (2,).
 
-    ``data`` (1,) is of ``FEET``, ``reference`` (2, 3) the foot's x and y, each as for
-    :func:`swing_step`; the foot left the ground ``elapsed`` [s] ago.
+    ``data`` (1,) is of ``FEET``, ``reference`` (2, 3) the foot's x and y; the foot left the ground
+    ``elapsed`` [s] ago.
     """
     now = data[0]
     for name in _SHAPE:
@@ -323,8 +314,8 @@ class Swings(NamedTuple):
 class Feet:
     """Roles of the two feet, which the automaton's resets change, and their swings.
 
-    ``reference`` (2, 2, 3) are the swings' references by foot: x and y, each as for
-    :func:`swing_step`. ``data`` (1,), of ``FEET``, explains the other numbers.
+    ``reference`` (2, 2, 3) has each foot's x and y, as for :func:`swing_step`; ``data`` (1,) is of
+    ``FEET``.
     """
 
     def __init__(self, reference: Array, data: Any) -> None:
@@ -367,8 +358,5 @@ class Feet:
 
     def apply(self, reset: Reset) -> None:
         """Change the roles as the automaton's reset does."""
-        if reset in _EXCHANGES:
+        if reset in (Reset.SHIFT, Reset.SWAP):
             self.data["roles"] = self.foot_of_leg[::-1]
-
-
-_EXCHANGES = (Reset.SHIFT, Reset.SWAP)

@@ -19,7 +19,7 @@ import numpy as np
 
 from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
-from template_control.embedding.com_path import KEPT, PATH, move_clock, plan_is_due, unload_cap
+from template_control.embedding.com_path import KEPT, PATH, move_clock, plan_is_due
 from template_control.embedding.contacts import (
     CONTACTS,
     DUE,
@@ -33,7 +33,6 @@ from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.lean import LEAN, advance_lean
-from template_control.embedding.learners import LOAD, observe_load
 from template_control.embedding.modes import GUARDS, MODE, first_fired
 from template_control.embedding.state import SENSED, read_state, rolled
 from template_control.embedding.swing import (
@@ -53,6 +52,15 @@ from template_control.whole_body.problem import solve_free
 from template_control.whole_body.task_rows import write_rows
 
 _F, _I = np.float64, np.int64
+
+LOAD = np.dtype(
+    [
+        ("sum", _F),  # of the vertical acceleration's feedback over the stride [m/s]
+        ("time", _F),  # over which it was summed [s]
+    ],
+    align=True,
+)
+"""Load estimate, within a stride."""
 
 TICK = np.dtype(
     [
@@ -81,7 +89,7 @@ SNAPSHOT = np.dtype(
         ("phase", _F),
         ("node", _I),  # its number on the automaton
         ("rear", _I),
-        ("stands", _I),
+        ("stands", np.bool_),
         ("template_com", _F, (2,)),
         ("template_velocity", _F, (2,)),
         ("template_force", _F, (LEGS, 2)),
@@ -100,6 +108,10 @@ _TOUCHDOWN, _VLO, _REST = int(Event.TOUCHDOWN), int(Event.VLO), int(Event.REST)
 _LIFTOFFS = (int(Event.REAR_LIFTOFF), int(Event.FRONT_LIFTOFF))  # by leg
 _REAR = 0
 _SIDE = 1
+# Largest normal force of a foot that is about to lift off, over the template's. It is over 1, as
+# the robot's forces are not exactly the template's.
+_UNLOADED = 1.3
+_FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and the QP some room
 
 
 @compiled
@@ -128,8 +140,8 @@ def sense(
     if first_fired(t) >= 0 or t.lateral.leaves:
         return EVENTFUL
     lands, deviation = t.mode.next_touchdown_leg >= 0, t.sensed.state[2] - references[0].com[2]
-    due = plan_is_due(t.path, lands, deviation, t.path.time, t.time)
-    return QUIET if due == KEPT else EVENTFUL
+    kept = plan_is_due(t.path, lands, deviation, t.path.time, t.time) == KEPT
+    return QUIET if kept else EVENTFUL
 
 
 @compiled
@@ -200,8 +212,7 @@ def advance(kept: Any, dt: float) -> None:
     move_clock(t.path, curve, s, mode, want, (r.com_velocity[0], dt))
     move_swings(t, r, want, dt)
     _move_in_space(t, r, want, lateral, dt)
-    for k in range(4):
-        want.com_now[k] = s.state[k]
+    want.com_now[:] = s.state
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
     want.lead, want.ahead = t.path.offset, np.nan
@@ -213,7 +224,8 @@ def advance(kept: Any, dt: float) -> None:
     _bear(t, r, qp[0], want, arrays[4].shape[1])
     write_rows(program, data, arrays, references, table)
     if mode.estimate_load:
-        observe_load(t.load, want.lift, dt)
+        t.load.sum += want.lift * dt
+        t.load.time += dt
     for axis in range(2):  # of the next tick, if nothing hits the robot
         s.pre_impact_velocity[axis] = s.state[2 + axis] + want.com[4 + axis] * dt
     t.time += dt
@@ -289,13 +301,10 @@ def _swing_sideways(t: Any, r: Any, want: Any, plan: tuple[Any, ...], dt: float)
     f, mode, path, lateral = t.feet, t.mode, t.path, t.lateral
     if not mode.swings:
         return
-    com, feet = np.empty(2), np.empty(2)
-    com[0], com[1] = r.com[_SIDE], side_speed(t, r)
-    first = np.inf
+    com, stood, first = np.array((r.com[_SIDE], side_speed(t, r))), lateral.stood[:, _SIDE], np.inf
     for i in range(mode.swings):
         first = min(first, path.landing_time[f.roles[mode.swing_leg[i]]])
-    for k in range(2):
-        feet[k] = lateral.stood[lateral.feet[k], _SIDE]
+    feet = np.array((stood[lateral.feet[0]], stood[lateral.feet[1]]))
     foothold = lateral_foothold(lateral, plan, path.time, com, feet)
     rests = path.event_times[_REST] < path.event_times[_VLO]
     if lateral.step != 0.0 and mode.stances == 1 and (rests or np.isnan(foothold)):
@@ -365,17 +374,17 @@ def _bear(t: Any, r: Any, qp: Any, want: Any, directions: int) -> None:
     """
     mode, forces, at = t.mode, t.path.forces, 0
     for leg in range(mode.stances):
-        foot, share = t.feet.roles[leg], 0
+        foot, share, cap = t.feet.roles[leg], 0, np.inf
         for i in range(r.members[foot]):
             share += want.stands[r.group[foot, i]]
+        if mode.unloads[leg]:
+            load, weight = forces[leg, 1], r.mass * r.gravity
+            if mode.unloading > 0.0:
+                due = t.path.event_times[_LIFTOFFS[leg]] - t.path.time
+                load = weight * max(due / mode.unloading, 0.0)
+            cap = _UNLOADED * max(load, 0.0) + _FLOOR * weight
         for _ in range(share):
-            qp.cap[at] = np.inf
-            if mode.unloads[leg]:
-                load = forces[leg, 1]
-                if mode.unloading > 0.0:
-                    due = t.path.event_times[_LIFTOFFS[leg]] - t.path.time
-                    load = r.mass * r.gravity * max(due / mode.unloading, 0.0)
-                qp.cap[at] = unload_cap(load, r.mass * r.gravity) / share
+            qp.cap[at] = cap / share
             qp.force[at, 0] = forces[leg, 0] / share
             qp.force[at, directions - 1] = forces[leg, 1] / share
             if directions > UP:
@@ -392,22 +401,18 @@ def look(tick: Any, data: Any, references: Any, out: Any) -> None:
     t, r, want, o = tick[0], data[0], references[0], out[0]
     f, mode, path, s, frame = t.feet, t.mode, t.path, t.sensed, t.frame
     o.time, o.phase, o.node, o.rear = t.time, path.time, mode.node, f.roles[_REAR]
-    o.stands = 1 if mode.stances > 0 else 0
+    o.stands = mode.stances > 0
     # Of the template's rear toe: at the foot, if that stands.
     origin = s.toes[_REAR] if mode.stances > 0 else path.toe
     to_world(frame, origin + want.com[0], s.ground + want.com[1], o.template_com)
     vector_to_world(frame, want.com[2], want.com[3], o.template_velocity)
     for leg in range(LEGS):
-        force = path.forces[leg]
-        vector_to_world(frame, force[0], force[1], o.template_force[leg])
-        o.side_reference[leg] = np.nan
-        for axis in range(2):
-            o.swing_reference[leg, axis] = np.nan
+        vector_to_world(frame, path.forces[leg, 0], path.forces[leg, 1], o.template_force[leg])
+    o.swing_reference[:], o.side_reference[:] = np.nan, np.nan
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
         place = want.foot[foot]
         to_world(frame, place[0, 0], place[1, 0], o.swing_reference[foot])
         o.side_reference[foot] = want.side[foot, 0]
-    rear = f.roles[_REAR]
-    o.sway[0] = r.com[_SIDE] - r.foot_position[rear, _SIDE]
+    o.sway[0] = r.com[_SIDE] - r.foot_position[f.roles[_REAR], _SIDE]
     o.sway[1] = side_speed(t, r)

@@ -148,16 +148,12 @@ def lateral_foothold(
     of the path [m].
     """
     path, aim = plan
-    pivots = np.empty(2)
-    for k in range(2):
-        pivots[k] = pivot(feet[k], com[0], lateral.rolling)
-    found = place(path, aim, time, com, pivots)
+    found = place(path, aim, time, com, pivot(feet, com[0], lateral.rolling))
     if found.left > lateral.hold or not lateral.placed:
         lateral.placed = 1 if np.isfinite(found.y) else 0
         lateral.y, lateral.wanted = found.y, found.wanted
         lateral.left, lateral.com = found.left, found.com
-        for k in range(2):
-            lateral.expected[k], lateral.slope[k] = found.expected[k], found.slope[k]
+        lateral.expected[:], lateral.slope[:] = found.expected, found.slope
     return contact(lateral.y, lateral.com, lateral.rolling)
 
 

@@ -74,17 +74,20 @@ def sway(t: Any, r: Any, want: Any, curve: tuple[Array, Array, Array]) -> None:
         s' = sum_i f_i (y - y_i) / (m h) - (z'' + g) / h clip(k e),
         e = xi - y_i - (X*_y + X*_v / w) exp(w t), t since the section, or -t until it.
     """
-    mode, forces, height = t.mode, t.path.forces, _height(t, r)
-    t.lateral.leaves = 0
-    if mode.follow_curve and mode.stances > 1 and _on_soles(t, r) and _rests(t):
+    mode, lateral, forces, due = t.mode, t.lateral, t.path.forces, t.path.event_times
+    height, lateral.leaves = _height(t, r), 0
+    rests = due[_REST] < min(due[_REAR_LIFTOFF], due[_FRONT_LIFTOFF], due[_VLO])
+    if mode.follow_curve and mode.stances > 1 and _on_soles(t, r) and rests:
         _stand(t, r, want)
         return
     if mode.follow_curve:
         if mode.stances == 1:  # a step needs no roll, and with one its leg is straight
-            want.lean[0] = t.lateral.bank
-        want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - _pressure(t, r, curve))
+            want.lean[0] = lateral.bank
+        if np.isnan(lateral.pressure) or t.time - lateral.pressure_at >= _AGAIN * lateral.unit:
+            lateral.pressure, lateral.pressure_at = _planned(t, r, curve), t.time
+        want.sway = (want.com[5] + r.gravity) / height * (r.com[_SIDE] - lateral.pressure)
         return
-    t.lateral.pressure = np.nan
+    lateral.pressure = np.nan
     want.sway = 0.0
     for leg in range(mode.stances):
         foot = t.feet.roles[leg]
@@ -92,10 +95,9 @@ def sway(t: Any, r: Any, want: Any, curve: tuple[Array, Array, Array]) -> None:
         want.sway += forces[leg, 1] * away / (r.mass * height)
     if mode.stances != 1:
         return
-    lateral, foot, rate = t.lateral, t.feet.roles[0], _rate(t, r)
-    since = t.time - lateral.section_began
+    foot, rate, since = t.feet.roles[_REAR], _rate(t, r), t.time - lateral.section_began
     if mode.next_touchdown_leg < 0:
-        since = t.path.time - t.path.event_times[_VLO]
+        since = t.path.time - due[_VLO]
     point = r.com[_SIDE] + side_speed(t, r) / rate - r.foot_position[foot, _SIDE]
     wanted = (lateral.cycle[0] + lateral.cycle[1] / rate) * np.exp(rate * since)
     if not np.isfinite(wanted):
@@ -112,13 +114,6 @@ def _on_soles(t: Any, r: Any) -> bool:
 
 
 @compiled
-def _rests(t: Any) -> bool:
-    """True if the CoM comes to rest on the path before any foot lifts off."""
-    due = t.path.event_times
-    return bool(due[_REST] < min(due[_REAR_LIFTOFF], due[_FRONT_LIFTOFF], due[_VLO]))
-
-
-@compiled
 def _stand(t: Any, r: Any, want: Any) -> None:
     """Write how the CoM of a robot that stays on both feet is to move, forward and to the left.
 
@@ -129,23 +124,19 @@ def _stand(t: Any, r: Any, want: Any) -> None:
     """
     lift = max(want.com[5] + r.gravity, _LIGHTEST * r.gravity) / _height(t, r)
     rear, uphill = t.feet.roles[_REAR], t.path.body[2]
-    here, way, half = r.foot_position[rear], np.empty(2), np.empty(2)
-    half[0], half[_SIDE] = SOLE_SHARE * t.path.body[5], SOLE_SHARE * t.lateral.half_width
-    com, point = np.empty(2), np.empty(2)
-    com[0], com[_SIDE] = t.sensed.state[0], r.com[_SIDE]
+    here, half = r.foot_position[rear, :2], np.array((t.path.body[5], t.lateral.half_width))
+    way, half = r.foot_position[1 - rear, :2] - here, SOLE_SHARE * half
+    com, point = np.array((t.sensed.state[0], r.com[_SIDE])), np.empty(2)
     # On a slope the CoM rests uphill of the centre of pressure.
     point[0] = com[0] + t.sensed.state[2] / np.sqrt(lift) - uphill / lift
     point[_SIDE] = com[_SIDE] + side_speed(t, r) / np.sqrt(r.sway * lift)
-    for axis in range(2):
-        way[axis] = r.foot_position[1 - rear, axis] - here[axis]
-        point[axis] -= here[axis]
+    point -= here
     off, gap = point[_SIDE] - 0.5 * way[_SIDE], point[_SIDE]
     if hold(way, half, point) > _BORNE * _height(t, r):
         t.lateral.leaves = 1
     gap -= point[_SIDE]
     _lunge(t, r, want, off, gap)
-    for axis in range(2):
-        point[axis] += here[axis]
+    point += here
     t.lateral.pressure, t.lateral.pressure_at = point[_SIDE], -np.inf
     want.ahead = lift * (com[0] - point[0]) - uphill
     want.sway = lift * (com[_SIDE] - point[_SIDE])
@@ -223,15 +214,6 @@ def hold(way: Array, half: Array, point: Array) -> float:
 def _height(t: Any, r: Any) -> float:
     """Height of the CoM over the ground [m]; of a robot that falls it may be below its feet."""
     return max(t.sensed.state[1], LOWEST * r.leg_length)
-
-
-@compiled
-def _pressure(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
-    """y of the centre of pressure for now [m], planned anew from time to time."""
-    lateral = t.lateral
-    if np.isnan(lateral.pressure) or t.time - lateral.pressure_at >= _AGAIN * lateral.unit:
-        lateral.pressure, lateral.pressure_at = _planned(t, r, curve), t.time
-    return lateral.pressure
 
 
 @compiled
@@ -335,8 +317,7 @@ def _shares_of_lifting(
     if not _on_soles(t, r):
         return 0.0, 1.0
     com, rear = np.empty(6), t.feet.roles[_REAR]
-    coefficients, meta, look = curve
-    sample(coefficients, meta, look, t.path.time + after, com)
+    sample(curve, t.path.time + after, com)
     lift = max(com[5] + r.gravity, _LIGHTEST * r.gravity)
     along = com[0] - com[4] * max(com[1], LOWEST * r.leg_length) / lift
     apart = r.foot_position[1 - rear, 0] - r.foot_position[rear, 0]
@@ -370,9 +351,7 @@ def _planned(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
     middle = 0.5 * (here + other)
     if rests:
         lasts[2] = max(ends - lasts[0] - lasts[1], _REST_IN * lateral.unit)
-    n = 0
-    for stage in range(_STAGES):
-        n += _PIECES if lasts[stage] > 0.0 else 0
+    n = _PIECES * np.count_nonzero(lasts > 0.0)
     found = np.empty(n)
     pieces = Pieces(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
     rate, at = _rate(t, r), 0
@@ -394,8 +373,7 @@ def _planned(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
             pieces.high[at] = here + max(least * apart, load * apart) + half
             pieces.wish[at] = middle if stage == 2 else here
             at += 1
-    start, end = np.empty(2), np.zeros(2)
-    start[0], start[1], end[0] = r.com[_SIDE], side_speed(t, r), middle
+    start, end = np.array((r.com[_SIDE], side_speed(t, r))), np.array((middle, 0.0))
     if not rests:
         end[0], end[1] = here + lateral.cycle[0], lateral.cycle[1]
     prices = (SMOOTH * lateral.unit, ARRIVE * lateral.unit)

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 from robot_guards import RobotGuards
 
 from template_control.embedding.com_path import at_direction, join, leg_forces, sample
-from template_control.embedding.learners import LOAD, LoadEstimate, observe_load
+from template_control.embedding.learners import LoadEstimate
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.state import TemplateState
+from template_control.embedding.tick import LOAD
 from template_control.errors import GaitError, RobotError
 from template_control.robot.start import state_at_vlo
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -32,7 +33,7 @@ def test_joined_path_is_continuous_and_knows_its_events(gait):
     times = np.linspace(0.0, path.duration - 1e-6, 400)
     states = np.empty((400, 6))
     for t, row in zip(times, states, strict=True):
-        sample(*path.curve, t, row)
+        sample(path.curve, t, row)
     assert np.max(np.abs(np.diff(states[:, :2], axis=0))) < 0.01
     touchdown, liftoff = path.time_of(Event.TOUCHDOWN), path.time_of(Event.REAR_LIFTOFF)
     assert touchdown < liftoff < path.time_of(Event.VLO)
@@ -80,9 +81,9 @@ def test_phase_look_up_inverts_the_path(brisk_gait, time, scale):
         [simulate_stride(P, STRIDE_START["w"], [0.0, gait.vlo[1], gait.vlo[0], 0.0], u)]
     ).curve
     state, found = np.empty(6), np.empty(6)
-    sample(*curve, time, state)
+    sample(curve, time, state)
     # A robot on the same ray from the foot, a little nearer or farther, is in the same phase.
-    t, _ = at_direction(*curve, scale * state[0], scale * state[1], 0.2, found)
+    t, _ = at_direction(curve, scale * state[0], scale * state[1], 0.2, found)
     assert t == pytest.approx(time, abs=1e-8)
     np.testing.assert_allclose(found, state, atol=1e-7)
 
@@ -127,6 +128,11 @@ def test_touchdown_is_the_placed_leg_s():
         contact, sensed = (leg == 0, leg == 1), TemplateState(toes=np.array([0.3, 0.3]))
         assert guards.fired(edge, sensed, np.inf, contact=contact)
         assert not guards.fired(other, sensed, np.inf, contact=contact)
+
+
+def observe_load(data, feedback, duration):
+    data["sum"] += feedback * duration
+    data["time"] += duration
 
 
 def test_load_learns_a_constant_and_ignores_the_gait():
