@@ -1,15 +1,14 @@
 """Controller that makes the robot move like the template (Fig. 11).
 
-It moves along the automaton's edges when the robot fires them, changes roles and swings of the
-feet, plans at every section and again where a foot has landed or a disturbance came, and turns the
-plan into references for the whole-body QP. What a phase needs, which tasks, which feet, which
-clock, is looked up in the table of phases: the controller knows no gait.
+It moves along the automaton's edges when the robot fires them, plans at every section and again
+where a foot has landed or a disturbance came, and turns the plan into references for the whole-body
+QP. What a phase needs is looked up in the table of phases: the controller knows no gait.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from math import nan
 from typing import Any
 
@@ -130,8 +129,8 @@ class EmbeddingController:
         self.feet = Feet(self.references.foot, tick["feet"])
         weight = robot.mass * robot.gravity
         set_contacts(tick["contacts"], o.contacts, weight, scale, robot.groups)
-        sensed = tick["sensed"], tick["mode"]
-        self.observer = StateObserver(robot, self.feet, self.references.com[4:], *sensed)
+        wanted = self.references.com[4:]
+        self.observer = StateObserver(robot, self.feet, wanted, tick["sensed"], tick["mode"])
         set_guards(tick["guards"], self.parameters, o.guards)
         check_legs(automaton, robot)
         self._modes = modes(automaton, robot.nv, o.phases)
@@ -140,9 +139,9 @@ class EmbeddingController:
         curved = {name for name, mode in self._modes.items() if mode.control.follow_curve}
         recovers = o.catches and automaton is AUTOMATON and planners.keys() >= NEEDED
         recovery = Recovery(self.parameters) if recovers else None
-        rules, path = (o.replan, automaton, curved, recovery), tick["path"]
-        self.supervisor = StrideSupervisor(route, planners, *rules, path)
-        path["body"][0, 5] = robot.half_length
+        rules = o.replan, automaton, curved, recovery
+        self.supervisor = StrideSupervisor(route, planners, *rules, tick["path"])
+        tick["path"]["body"][0, 5] = robot.half_length
         self._enter(next(iter(self._modes)))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o)
@@ -152,8 +151,8 @@ class EmbeddingController:
         if isinstance(robot, FloatingBaseBiped) and isinstance(given, FreeOptions):
             keeps = self.feet, self.references, tick["lateral"]
             self.lateral = LateralMotion(robot, self.parameters, given, *keeps)
-        self._memory = self._tick, robot.data, self.references.data, self.qp.data
         self.memory = tick, robot.data, self.references.data
+        self._memory = *self.memory, self.qp.data
 
     @property
     def time(self) -> float:
@@ -179,9 +178,7 @@ class EmbeddingController:
         """Node, phase, template and swing references of the last tick."""
         seen = np.zeros(1, SNAPSHOT)
         look(*self.memory, seen)
-        found = {field.name: seen[field.name][0] for field in fields(Snapshot)}
-        for name, number in (("time", float), ("phase", float), ("rear", int), ("stands", bool)):
-            found[name] = number(found[name])
+        found = dict(zip(SNAPSHOT.names or (), seen[0].item(), strict=True))
         return Snapshot(**{**found, "node": self.node.name})
 
     def first_pitch(self) -> float:
@@ -260,23 +257,21 @@ class EmbeddingController:
             ParameterError: if a planner, the route or a task answers with nonsense.
         """
         self.robot.update(*self.frame.enter(q, v))
-        if self._sense(contact, force, dt):
-            self._decide_anew()
-        solution = self._act(dt)
-        if force is not None and self.lateral is not None:
-            robot = self.lateral.robot
-            feel_in_space(self._tick, robot.data, self.qp.data, force, robot.axes, dt)
-        return solution
-
-    def _sense(self, contact: BoolArray, force: Array | None, dt: float) -> bool:
-        """Take in what was measured; whether there is anything to decide."""
         felt = NO_FORCE if force is None or self.lateral is not None else force
         if not self.frame.of_world:
             felt = self.frame.inward(felt)
         found = sense(*self._memory, contact, felt, dt)
         if found == DIVERGED:
             raise self.observer.diverged()
-        return bool(found != QUIET) or self._slope_unknown
+        if found != QUIET or self._slope_unknown:
+            self._decide_anew()
+        solution = self._act(dt)
+        if self.frame.angle != 0.0:
+            solution = solution._replace(acceleration=self.frame.leave(solution.acceleration))
+        if force is not None and self.lateral is not None:
+            robot = self.lateral.robot
+            feel_in_space(self._tick, robot.data, self.qp.data, force, robot.axes, dt)
+        return solution
 
     def lateral_state(self) -> Array:
         """(2,) y of a floating-base robot's CoM, and dy/dt as the forward speed has it."""
@@ -298,8 +293,10 @@ class EmbeddingController:
         """Write the plan to where ticks read it."""
         stand(*self._memory)
         self._tick["trim"] = self.learners.trim.acceleration
-        sideways = None if self.lateral is None else self.lateral.plan(self.supervisor)
-        self._plan: tuple[Any, ...] = tuple(self.supervisor.path.curve), sideways
+        path, sideways = self.supervisor.path, None
+        if self.lateral is not None:
+            sideways = self.lateral.planner.follow(path, self.supervisor.feet)
+        self._plan: tuple[Any, ...] = tuple(path.curve), sideways
         self._room: tuple[Matrices, Array] | None = None  # all of ``_kept`` is to be kept anew
 
     def _act(self, dt: float) -> Solution:
@@ -315,10 +312,7 @@ class EmbeddingController:
             kind = solve(self._kept, found)
         else:
             kind = act(self._kept, found, dt)
-        solution = qp.finish(kind, tasks, found)
-        if self.frame.angle == 0.0:
-            return solution
-        return solution._replace(acceleration=self.frame.leave(solution.acceleration))
+        return qp.finish(kind, tasks, found)
 
     def _find_first_slope(self) -> None:
         """Both feet stand where a run begins: the line through them is the ground."""
@@ -335,23 +329,22 @@ class EmbeddingController:
         self.supervisor.pass_event(edge.event)
         self._enter(str(edge.target))
         self.feet.apply(edge.reset)
-        lifted = stood - self._standing()
+        stands, observer = self._standing(), self.observer
+        lifted = stood - stands
+        rear = self.feet.foot_of_leg[Leg.REAR]
         # What the ground does next is not known; the best guess is its slope so far.
-        leans = bool(lifted and self.node.stance) and self._tilt_axes(
-            self.slope.slope, self.feet.foot_of_leg[self.node.stance[0]]
-        )
+        leans = bool(lifted and stands) and self._tilt_axes(self.slope.slope, rear)
         for foot in lifted:
             self._lift(foot)
-        observer, stance = self.observer, self.node.stance
-        if self.feet.landed in lifted and stance:
+        if self.feet.landed in lifted and stands:
             # A step back: the other foot is the one on the ground.
-            observer.stand_on(self.feet.foot_of_leg[stance[0]])
+            observer.stand_on(rear)
         if lifted or self.feet.foot_of_leg != roles:
             observer.take_roles()
-            self.supervisor.set_rear_toe(self.feet.foot_of_leg[Leg.REAR])
+            self.supervisor.set_rear_toe(rear)
         if self.mode.control.momentum_speed is not before.control.momentum_speed:
             observer.read_speed()
-        if leans or (lifted and not stance):
+        if leans or (lifted and not stands):
             # In flight no force moves the CoM: its path, and all footholds on it, are certain.
             self.supervisor.follow(self.node, observer.now, self.time)
         placed = PLACED.get(edge.reset)
@@ -366,9 +359,7 @@ class EmbeddingController:
 
     def _lift(self, foot: int, swung: float = 0.0) -> None:
         """A swing keeps the shape with which it began, whatever the next stride's is."""
-        supervisor = self.supervisor
-        goal = supervisor.goal if supervisor.deciding else supervisor.first_goal()
-        shape = self.mode.control.swing or self.swings.towards(goal)
+        shape = self.mode.control.swing or self.swings.towards(self.supervisor.goal)
         self.feet.lift(foot, self.robot, shape, swung)
         if self.lateral is not None:
             self.lateral.lift(foot)
@@ -397,8 +388,8 @@ class EmbeddingController:
             s = replace(s, state=np.concatenate((s.state[:2], self.observer.pre_impact_velocity)))
         chooses = self.mode.control.replan_at_touchdown
         cause = Cause.TOUCHDOWN if chooses else Cause.GROUND_HEIGHT
-        replan = self.supervisor.replan
-        self._enter(replan(cause, self.node, s, self.time, height_error=higher).name)
+        node = self.supervisor.replan(cause, self.node, s, self.time, height_error=higher)
+        self._enter(node.name)
 
     def _tilt_axes(self, slope: float, foot: int) -> bool:
         """Turn the axes about a foot, as far as the planner knows slopes; whether they turned."""
@@ -419,7 +410,7 @@ class EmbeddingController:
         # In the plane a robot turns round only where it rests.
         asks = lateral is not None or section is REST
         course = self.course(self.time) if asks else Course()
-        if supervisor.deciding:
+        if supervisor.reports:
             nominal, ended = supervisor.decision.nominal, section.of(s.state)
             if self._turn(section, course, nominal):
                 self.robot.update(*self.frame.enter(*self.frame.raw_state))
@@ -430,13 +421,14 @@ class EmbeddingController:
             learners.end_stride(section, s.state, nominal)
         if section is REST and self.robot.patches:
             self._face_ahead()  # a foot may have been set down behind the other one
-        now = section, s, self.time, learners.state
-        self._enter(supervisor.decide(*now, reached).name)
+        node = supervisor.decide(section, s, self.time, learners.state, reached)
+        self._enter(node.name)
         learners.begin_stride(supervisor, self.mode.trimmed)
+        taken = Course()
         if lateral is not None:
             stride = section, supervisor, course, self.node, s, self.lateral_state(), self.time
             self._enter(lateral.begin_stride(*stride).name)
-        taken = Course() if lateral is None else lateral.taken
+            taken = lateral.taken
         self.courses.append(taken._replace(facing=self.robot.facing))
 
     def _turn(self, section: Section, course: Course, nominal: bool) -> bool:

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from template_control.checks.ranges import Range
 from template_control.embedding.contacts import ContactOptions, FrictionOptions
 from template_control.embedding.lean import LeanOptions
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.phases import PHASES, PhaseControl, Phases
+from template_control.embedding.planners.ahead import AheadOptions
+from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError, meant
@@ -19,6 +21,19 @@ from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions
 from template_control.whole_body.task import Task, task_name
+
+
+class Planning(NamedTuple):
+    """Planners' tuning for a kind of robot.
+
+    ``walks_ahead``: whether a walk that is kept is planned ahead; ``bears``: whether its feet bear
+    the centre of pressure around them.
+    """
+
+    lqr: LqrOptions
+    ahead: AheadOptions
+    walks_ahead: bool = False
+    bears: bool = False
 
 
 @dataclass(frozen=True)
@@ -47,6 +62,7 @@ class EmbeddingOptions(QpOptions):
     """
 
     kind: ClassVar[str] = "planar"
+    planning: ClassVar[Planning] = Planning(LqrOptions(), AheadOptions())
 
     trunk_pitch: Annotated[float, Range(-1.5, 1.5)] = tuned(0.0)
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(PHASES))

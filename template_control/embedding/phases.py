@@ -40,8 +40,7 @@ class PhaseControl(Checked):
         clock: how the robot is located on the path.
         momentum_speed: whether the sensed speed includes the angular momentum about the CoM;
             this needs a stance foot.
-        unload_legs: legs whose normal force is kept near the template's, so that they have no
-            load left to lift off with.
+        unload_legs: legs whose normal force is kept near the template's: they lift off unloaded.
         unloading: time over which these legs give up a load that is not the template's, before
             they lift off [s]; 0: their load is the template's.
         estimate_load: whether the load estimate observes this phase.
@@ -55,8 +54,7 @@ class PhaseControl(Checked):
             (:func:`~template_control.embedding.state.unrolled`); else it moves with the foot's
             lowest point.
         use_pre_impact_velocity: whether the path from a touchdown begins with the velocity before
-            the foot hit the ground. How much of the impact is over when it is felt varies from
-            step to step; the template lands without one.
+            it. How much of the impact is over when it is felt varies; the template has none.
         settles: whether a foot that is to stand, and does not touch the ground, bears nothing, and
             its tasks bring it down; else it bears as if it touched.
     """
@@ -96,11 +94,6 @@ _RUNNING_STANCE = PhaseControl(
 # trim nothing to do.
 _UNTRIMMED = PhaseControl(tasks=(ComTask((1.0, 3.0)), PostureTask()), unload_legs=(Leg.REAR,))
 
-# Nobody walks: time passes, and both feet carry.
-_STANDING = PhaseControl(
-    tasks=(ComTask((1.0, 3.0)), PostureTask()), clock=Clock.TIME, follow_curve=True
-)
-
 _SINGLE_STANCE = PhaseControl(
     # Height before the swing foot: near VLO its pull on the ground would need more normal
     # force than the template has there. A point foot cannot change the momentum about
@@ -108,8 +101,6 @@ _SINGLE_STANCE = PhaseControl(
     tasks=(ComTask((0.01, 10.0)), PostureTask(), FootTask(Leg.FRONT)),
     swings=(Leg.FRONT,),
 )
-# A step from a stand may go back, and nearly rest over its foot: directions give no time.
-_STEPPING = replace(_SINGLE_STANCE, clock=Clock.TIME, follow_curve=True)
 
 
 def running_phases(
@@ -149,13 +140,17 @@ def running_phases(
 
 
 def standing_phases(
-    standing: PhaseControl, stepping: PhaseControl, unloading: float = 0.0
+    double: PhaseControl, single: PhaseControl, unloading: float = 0.0
 ) -> dict[Phase | str, PhaseControl]:
     """Entries of a stand, and of the strides to it, from it, and between two speeds of a walk.
 
-    By the control of both feet on the ground, and of the single stance of a step from a stand;
+    By the tasks of both feet on the ground, and the control of a walk's single stance;
     ``unloading`` is that of :class:`PhaseControl`.
     """
+    # Nobody walks: time passes, and both feet carry.
+    standing = replace(double, unload_legs=(), clock=Clock.TIME, follow_curve=True)
+    # A step from a stand may go back, and nearly rest over its foot: directions give no time.
+    stepping = replace(single, clock=Clock.TIME, follow_curve=True)
     resting = replace(standing, estimate_load=False)
     lifting = replace(resting, unload_legs=(Leg.REAR,), unloading=unloading)
     return {
@@ -183,7 +178,7 @@ PHASES: Phases = {
     "DS_sc^wp": replace(_UNTRIMMED, rolling_contact=True, use_pre_impact_velocity=True),
     "DS_sd^wp": replace(_UNTRIMMED, rolling_contact=True),
     "SS_bv^wp": replace(_SINGLE_STANCE, rolling_contact=True),
-    **standing_phases(_STANDING, _STEPPING),
+    **standing_phases(_UNTRIMMED, _SINGLE_STANCE),
 }
 """Control of walking and running in each phase; transitions may start from it."""
 

@@ -83,9 +83,8 @@ _EVERY = 3  # link of the family's chains is looked at
 _ROUNDING = 1e-6  # of a centimetre per second
 # Of the quintic that a foot follows, over its length and duration.
 _QUINTIC_SPEED, _QUINTIC_ACCELERATION = 1.875, 10.0 / float(np.sqrt(3.0))
-_RANGES = {"walk": speed_range, "run": running_speeds}
+_RANGES = {"walk": (speed_range, "at VLO"), "run": (running_speeds, "at apex")}
 _STRIDE = 0.7  # of sqrt(l0 / g): the duration of a fast running stride
-_WHERE = {"walk": "at VLO", "run": "at apex"}
 
 
 @checked
@@ -369,8 +368,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
         )
     push_off = may if push_off is None else push_off
     if not push_off:
-        _check_speeds(robot, own)
-        _check_accelerations(robot, own)
+        _check_segments(robot, own)
     slowest, fastest = (family_speeds if push_off else speed_range)(p)
     moves = own.segments[0].gait in _RANGES
     if moves and not slowest <= own.start[0] <= fastest:
@@ -392,26 +390,19 @@ def _family_height(p: SlipParameters) -> Callable[[float], float]:
     return lambda speed: float(row_at(table, speed)[STATE + 1])
 
 
-def _check_speeds(robot: Biped, own: Scenario) -> None:
-    """Refuse speeds that no gait has."""
+def _check_segments(robot: Biped, own: Scenario) -> None:
+    """Refuse speeds that no gait has, and changes that no stride makes, whatever its motors."""
+    p = own.parameters
+    most = scaled(AGILE, Scale.of(p)).pace / (_STRIDE * float(np.sqrt(p.rest_length / p.gravity)))
     for number, segment in enumerate(own.segments, 1):
-        if segment.gait not in _RANGES:
-            continue
-        slowest, fastest = _RANGES[segment.gait](own.parameters)
+        find_range, where = _RANGES.get(segment.gait, (None, ""))
+        slowest, fastest = (-np.inf, np.inf) if find_range is None else find_range(p)
         for speed in (segment.speed, segment.until_speed):
             if speed is not None and not slowest <= speed <= fastest:
                 raise ScenarioError(
                     f"segment {number} wants to {segment.gait} at {speed:g} m/s:"
-                    f" {robot.name} can {segment.gait} from {inward(slowest, fastest)} m/s"
-                    f" {_WHERE[segment.gait]}"
+                    f" {robot.name} can {segment.gait} from {inward(slowest, fastest)} m/s {where}"
                 )
-
-
-def _check_accelerations(robot: Biped, own: Scenario) -> None:
-    """Refuse what no stride can do, however strong the motors: they bound it further."""
-    p = own.parameters
-    most = scaled(AGILE, Scale.of(p)).pace / (_STRIDE * float(np.sqrt(p.rest_length / p.gravity)))
-    for number, segment in enumerate(own.segments, 1):
         if abs(segment.acceleration) > most:
             raise ScenarioError(
                 f"segment {number} wants {segment.acceleration:g} m/s^2: a stride of {robot.name}"

@@ -63,14 +63,14 @@ _SLOW = 0.3  # extension of a leg over sqrt(g l0)
 
 
 class StrideSupervisor:
-    """Supervisor of a stride: decision at its section, path, and new plans on the way.
+    """Supervisor of a stride.
 
     In ``curved`` nodes the planner's curve is followed, not the template's springs; ``recovery`` is
     what a walk that cannot go on breaks into, None: nothing. ``data`` (1,), of ``PATH``, is where
     ticks follow the path.
 
     Attributes:
-        goal, decision: of the present stride, the last ones.
+        goal, decision: of the present stride, as they are from now on.
         log: one report for each stride that has ended.
         path: the template's, from the last plan on.
         feet: that were the rear and the front leg's where the path starts.
@@ -102,7 +102,7 @@ class StrideSupervisor:
         for name in ("patience", "interval", "speed"):
             self.data[name] = getattr(options, name)
         self._body: Array = self.data["body"][0]
-        self._body[0], self._body[3] = self.parameters.mass, self.parameters.rest_length
+        self._body[[0, 3]] = self.parameters.mass, self.parameters.rest_length
         self._event_times: Array = self.data["event_times"][0]
         self._event_times[:] = np.inf
         self._viable = True
@@ -119,11 +119,6 @@ class StrideSupervisor:
         self._planners = RoutePlanners(route, planners, automaton, recovery)
         self._rollout = TemplateRollout(self._planners, automaton, curved)
         self.height_error = self._rollout.height_error
-        self._curved_kinds = {
-            kind
-            for kind, start in automaton.starts.items()
-            if any(node.name in curved for node in automaton.stride(start))
-        }
 
     def begin(self, section: Section) -> tuple[Planner, Node]:
         """Planner and first node of the stride that the route begins with, at ``section``.
@@ -136,8 +131,8 @@ class StrideSupervisor:
         self.log.clear()
         self._begun = None
         self.arrived = False
-        goal = self.first_goal()
-        return self._planners.of(goal), self.automaton.start(goal.stride)
+        self.goal = self.first_goal()
+        return self.planner, self.automaton.start(self.goal.stride)
 
     def first_goal(self) -> StrideGoal:
         """The stride that the route begins with; a ParameterError if the route is empty."""
@@ -158,11 +153,6 @@ class StrideSupervisor:
         return [*self.log, now]
 
     @property
-    def deciding(self) -> bool:
-        """True if a stride has been decided in this run."""
-        return self._begun is not None
-
-    @property
     def begun_at(self) -> float:
         """Time at which the present stride was decided first [s]."""
         return 0.0 if self._begun is None else self._begun.time
@@ -170,7 +160,8 @@ class StrideSupervisor:
     @property
     def _along_curve(self) -> bool:
         """True if a curve carries the present stride, at least in part."""
-        return self.goal.stride in self._curved_kinds
+        nodes = self.automaton.stride(self.automaton.starts[self.goal.stride])
+        return any(node.name in self.curved for node in nodes)
 
     def decide(
         self,
@@ -248,10 +239,10 @@ class StrideSupervisor:
                 return other
             # A stride on the springs keeps what was chosen as the robot broke into it.
             if self._along_curve:
-                self.set_decision(choose_stiffnesses(self._rollout, s))
+                self.decision = choose_stiffnesses(self._rollout, s) or self.decision
             return self.follow(node, sensed, now)
         decision = rule.choose(self._rollout, s)
-        self.set_decision(decision)
+        self.decision = decision or self.decision
         node = self.follow(node, sensed, now, angle_drop=rule.angle_drop)
         lasts = not s.whole or decision is None or decision.lasting
         if not rule.recovers or (lasts and self._viable):
@@ -259,8 +250,8 @@ class StrideSupervisor:
         return self._recover(self._situation(node, sensed), now) or node
 
     def _situation(self, node: Node, sensed: TemplateState, phase_time: float = 0.0) -> Situation:
-        first = node.name == self.automaton.starts[self.goal.stride]
-        whole = first and node.name not in self.curved
+        begins = node.name == self.automaton.starts[self.goal.stride]
+        whole = begins and node.name not in self.curved
         to_go = self.time_of(Event.TOUCHDOWN) - phase_time
         return Situation(node, sensed, self.goal, self.decision, whole, to_go)
 
@@ -274,11 +265,6 @@ class StrideSupervisor:
         self.goal, self.decision = found.goal, found.decision
         self._recovering = True
         return self.follow(found.node, s.sensed, now)
-
-    def set_decision(self, decision: Decision | None) -> None:
-        """Let a decision hold for the present stride from now on; None keeps the one so far."""
-        if decision is not None:
-            self.decision = decision
 
     def on_slope(self, slope: float) -> float:
         """Plan for another slope [rad] from now on; the slope that is planned for.
@@ -298,7 +284,7 @@ class StrideSupervisor:
             assists = (other.assist for other in answers.values() if other is not None)
             ground = replace(ground, assist=next(filter(None, assists), 0.0))
         if self._stand_on(ground):
-            self.set_decision(replace(self.decision, nominal=False))
+            self.decision = replace(self.decision, nominal=False)
         return ground.slope
 
     def _stand_on(self, ground: SlipParameters) -> bool:

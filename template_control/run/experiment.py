@@ -16,12 +16,7 @@ from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.motion import Course
-from template_control.embedding.free.options import (
-    KINDS,
-    AnyOptions,
-    default_options,
-    options_of_kind,
-)
+from template_control.embedding.free.options import AnyOptions, default_options, options_of_kind
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
     AheadOptions,
@@ -203,7 +198,7 @@ class Experiment(Checked):
         runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
         if runs or isinstance(motion, RunningGait):
             return RunningOptions()
-        kind = KINDS[self._kind().kind]
+        kind = self._kind().planning
         ahead = False
         if isinstance(motion, Scenario):
             ahead = motion.has_any_speed(kind.bears) and (kind.bears or not self.free)
@@ -304,7 +299,7 @@ class Experiment(Checked):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
         if planner is None and isinstance(motion, SpeedRoute):
-            planner = KINDS[self.tuning.kind].ahead
+            planner = self.tuning.planning.ahead
         if planner is None:
             return motion, default_planners(motion, standing=standing_options(robot))
         if isinstance(planner, Mapping):

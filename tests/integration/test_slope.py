@@ -260,7 +260,7 @@ def test_two_legs_take_a_drift_away(level_gait, standing, speed):
     landed = simulate_stride(p, STRIDE_START["w"], VLO.state(z), u).events[0].state
     toe = landed[0] + p.rest_length * np.cos(u[Slot.TOUCHDOWN_ANGLE])
     sensed = TemplateState(state=landed, toes=np.array([0.0, toe]))
-    supervisor.set_decision(replace(supervisor.decision, controls=u))
+    supervisor.decision = replace(supervisor.decision, controls=u)
     rollout, node = supervisor._rollout, AUTOMATON.node("DS_sc^w")
     before, _ = rollout.ahead(node, sensed)(u)
     supervisor.on_slope(0.0)

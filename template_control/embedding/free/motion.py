@@ -36,8 +36,7 @@ from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Event, StrideKind
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.gait import LateralWish, Side
-from template_control.slip.lateral.path import LateralPath
-from template_control.slip.lateral.placing import LATERAL, LateralAim
+from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
@@ -119,9 +118,9 @@ class LateralMotion:
         scale = self._scale = Scale.of(parameters)
         step = self.step_width = scaled(options, scale).step_width
         self.stand_width = SOLE_STAND * parameters.rest_length if robot.patches else step
-        wish = LateralWish(step)
-        rolling = robot.foot_radius / parameters.rest_length if robot.paired else 0.0
         self.robot, self._feet, self._references = robot, feet, references
+        rolling = robot.foot_radius / parameters.rest_length if robot.paired else 0.0
+        wish = LateralWish(step)
         self.planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway, rolling)
         data["bank_rate"] = BANK_RATE / scale.time
         data["unit"], data["pressure"] = scale.time, np.nan
@@ -130,11 +129,6 @@ class LateralMotion:
         # Speed to the left [m/s], rates of the trunk: in the world, and from its course [rad/s].
         self._now: Array = np.zeros(3)
         self._turns = 0.0  # of the trunk from the course, in the present stride [rad]
-        self._reach = BEYOND * scale.length
-        turns = TURN_RAMP / scale.time**2, RUN_RAMP / scale.time**2
-        self._ramps = (SIDE_RAMP * scale.length / scale.time**2, *turns)
-        self._own_ramps = {kind: ramp / scale.time**2 for kind, ramp in TURN_RAMPS.items()}
-        self._facing = FACING_RATE / scale.time, FACING_TIME * scale.time
 
     def begin(self, gaits: Iterable[Gait], course: Course, in_flight: bool) -> None:
         """Begin a run with the first gait that has steps; it turns at once, but not in flight."""
@@ -243,8 +237,7 @@ class LateralMotion:
             for contact in self.robot.groups[foot]:
                 lifted = self._feet.data["lifted"][0, contact, :2]
                 lifted[:] = lifted @ [[c, -s], [s, c]]
-        away = self._stood - about
-        self._stood[:] = away @ [[c, -s], [s, c]] + about
+        self._stood[:] = (self._stood - about) @ [[c, -s], [s, c]] + about
 
     def begin_stride(
         self,
@@ -265,10 +258,10 @@ class LateralMotion:
         planner.data["section_began"] = time
         if not _steps(gait):
             return self._stand(section, node, supervisor)
-        side_ramp, walk_ramp, run_ramp = self._ramps
-        turn_ramp = self._own_ramps.get(gait.stride, walk_ramp if node.stance else run_ramp)
-        most = gait.step_duration * np.array([side_ramp, turn_ramp, turn_ramp])
-        wanted = self._wanted(course)
+        scale, turning = self._scale, TURN_RAMP if node.stance else RUN_RAMP
+        turn_ramp = TURN_RAMPS.get(gait.stride, turning) / scale.time**2
+        ramps = np.array([SIDE_RAMP * scale.length / scale.time**2, turn_ramp, turn_ramp])
+        most, wanted = gait.step_duration * ramps, self._wanted(course)
         if node.stance and self.robot.paired:
             rate = _PAIR_TURN / gait.step_duration
             wanted[1] = min(max(wanted[1], -rate), rate)
@@ -285,7 +278,7 @@ class LateralMotion:
         def follow(decision: Decision) -> Node:
             if decision is supervisor.decision:
                 return node
-            supervisor.set_decision(decision)
+            supervisor.decision = decision
             return supervisor.follow(node, sensed, time)
 
         def look(decision: Decision) -> LateralForecast:
@@ -297,7 +290,8 @@ class LateralMotion:
         if not node.stance:
             planner.due = inf
             return node
-        node = follow(early_touchdown(supervisor.decision, decide, look, self._reach))
+        reach = BEYOND * scale.length
+        node = follow(early_touchdown(supervisor.decision, decide, look, reach))
         planner.due = supervisor.time_of(Event.TOUCHDOWN)
         return node
 
@@ -305,7 +299,8 @@ class LateralMotion:
         """(3,) what a course wants of a robot that goes: see ``_now``."""
         if course.turns_round(self.robot):
             return np.zeros(3)
-        fastest, constant = self._facing
+        time = self._scale.time
+        fastest, constant = FACING_RATE / time, FACING_TIME * time
         turns = min(max(course.away(self.robot) / constant, -fastest), fastest)
         return np.array([course.left, course.turning, turns])
 
@@ -351,7 +346,3 @@ class LateralMotion:
         motion = now["foot_position"][foot, _SIDE], now["foot_velocity"][foot, _SIDE], 0.0
         self._references.side[foot] = motion
         self._references.offset[list(self.robot.groups[foot])] = 0.0
-
-    def plan(self, supervisor: StrideSupervisor) -> tuple[LateralPath, LateralAim]:
-        """Plan of :func:`.lateral_foothold` on the supervisor's path."""
-        return self.planner.follow(supervisor.path, supervisor.feet)

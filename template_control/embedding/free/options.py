@@ -15,20 +15,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.embedding.lean import LeanOptions
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.options import EmbeddingOptions, Planning
 from template_control.embedding.phases import (
     RUNNING_SWING,
-    Clock,
     PhaseControl,
     Phases,
     running_phases,
     standing_phases,
 )
-from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD, AheadOptions
+from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.standing.supports import UNLOADING
@@ -83,14 +82,9 @@ _POINT_RUNNING = PhaseControl(
 # The foot of a hop is hardly ahead of the CoM or behind it, and what turns about the vertical costs
 # ten times as much about y: back on one foot, forth on the other. With a weight of 400 the trunk
 # does not turn with its heading, and with 2000 the foot slides as it lands.
+_HOPPING_SPIN = SpinTask(weight=(130.0, 130.0, 1000.0))
 _POINT_HOPPING = replace(
-    _POINT_RUNNING,
-    tasks=(
-        ComTask((0.01, 10.0)),
-        SpinTask(weight=(130.0, 130.0, 1000.0)),
-        *_FEET,
-        SpareJointTask(),
-    ),
+    _POINT_RUNNING, tasks=(ComTask((0.01, 10.0)), _HOPPING_SPIN, *_FEET, SpareJointTask())
 )
 
 _POINT_SINGLE = PhaseControl(
@@ -157,9 +151,6 @@ _SOLE_DOUBLE = PhaseControl(
     unload_legs=(Leg.REAR,),
 )
 
-_SOLE_STANDING = replace(_SOLE_DOUBLE, unload_legs=(), clock=Clock.TIME, follow_curve=True)
-_SOLE_STEPPING = replace(_SOLE_SINGLE, clock=Clock.TIME, follow_curve=True)
-
 SOLE_PHASES: Phases = {
     **running_phases(
         (
@@ -171,7 +162,7 @@ SOLE_PHASES: Phases = {
         _SOLE_DOUBLE,
     ),
     **_walking_phases(_SOLE_SINGLE, _SOLE_DOUBLE),
-    **standing_phases(_SOLE_STANDING, _SOLE_STEPPING, UNLOADING),
+    **standing_phases(_SOLE_DOUBLE, _SOLE_SINGLE, UNLOADING),
 }
 """Standing, walking, and runs on flat feet. Nodes of other gaits find the entry of their phase."""
 
@@ -179,46 +170,49 @@ SOLE_PHASES: Phases = {
 _LEVEL = OrientationTask((10.0, 10.0, 10.0), yaw_gains=(100.0, 20.0))
 
 
-def _pair(leg: Leg) -> tuple[Task, ...]:
-    """Tasks of both feet of a pair."""
-    return tuple(
-        task(leg, contact=contact) for contact in range(2) for task in (FootTask, SideFootTask)
-    )
-
-
-# Of a pair that has landed, the foot that has not touched yet comes down.
-_PAIR_STANCE = PhaseControl(
-    tasks=(ComTask((0.01, 10.0)), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)), swings=(Leg.FRONT,)
+_BOTH_PAIRS: tuple[Task, ...] = tuple(
+    task(leg, contact=contact)
+    for leg in Leg
+    for contact in range(2)
+    for task in (FootTask, SideFootTask)
 )
+# Of a pair that has landed, the foot that has not touched yet comes down.
+_PAIR_STANCE = PhaseControl((ComTask((0.01, 10.0)), _LEVEL, *_BOTH_PAIRS), swings=(Leg.FRONT,))
 # The ground's force has no moment about the line between two feet, which is oblique: feedback that
 # moves x alone moves y too. A walk without push-off has no other means to keep its speed.
 _PAIR_SWAYING = replace(_PAIR_STANCE, tasks=(*_PAIR_STANCE.tasks, SwayTask()))
 _PAIR_RUNNING = replace(_PAIR_SWAYING, swing=RUNNING_SWING, settles=True)
 _PAIR_DOUBLE = PhaseControl(
-    tasks=(ComTask((1.0, 3.0)), SwayTask(), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
-    unload_legs=(Leg.REAR,),
+    (ComTask((1.0, 3.0)), SwayTask(), _LEVEL, *_BOTH_PAIRS), unload_legs=(Leg.REAR,)
 )
-
 # Four feet stand, and hold the CoM's y too.
-_PAIR_STANDING = PhaseControl(
-    tasks=(ComTask((10.0, 10.0)), SwayTask(10.0), _LEVEL, *_pair(Leg.REAR), *_pair(Leg.FRONT)),
-    clock=Clock.TIME,
-    follow_curve=True,
-)
-_PAIR_STEPPING = replace(_PAIR_STANCE, clock=Clock.TIME, follow_curve=True)
+_PAIR_STANDING = PhaseControl((ComTask((10.0, 10.0)), SwayTask(10.0), _LEVEL, *_BOTH_PAIRS))
 
 TROT_PHASES: Phases = {
     **running_phases(
-        (OrientationTask((0.01, 0.01, 0.001)), *_pair(Leg.REAR), *_pair(Leg.FRONT)),
+        (OrientationTask((0.01, 0.01, 0.001)), *_BOTH_PAIRS),
         _PAIR_RUNNING,
         _PAIR_DOUBLE,
     ),
     **_walking_phases(_PAIR_STANCE, _PAIR_DOUBLE),
     "SS_av^wp": _PAIR_SWAYING,
     "SS_bv^wp": _PAIR_SWAYING,
-    **standing_phases(_PAIR_STANDING, _PAIR_STEPPING, UNLOADING),
+    **standing_phases(_PAIR_STANDING, _PAIR_STANCE, UNLOADING),
 }
 """Standing, walking and running trot. Nodes of other gaits find the entry of their phase."""
+
+
+FREE_PLANNER = LqrOptions(earliest_touchdown=0.1, earliest_share=1.0, trusted_price=0.3)
+"""Tuning of a floating-base robot's LQR planner.
+
+Its swing leg has to move sideways too, and needs time. Its first steps from a start are further
+from the gait than a planar robot's, and the law of a slow gait is good in its neighbourhood only:
+at 0.4 m/s it led Bolt from an error of 2 mm to one of 0.1 m/s. So the search begins earlier.
+"""
+
+# A heavy leg needs longer to get in front. After a step up a foot was to land 0.08 s after VLO
+# (l0 = 0.67 m); it landed next to the other one, and G1 fell.
+_SOLE_PLANNER = replace(FREE_PLANNER, earliest_touchdown=0.15, earliest_share=0.2)
 
 
 @dataclass(frozen=True)
@@ -228,19 +222,20 @@ class FreeOptions(EmbeddingOptions):
     The fields of :class:`~template_control.embedding.options.EmbeddingOptions` come first.
 
     Attributes:
-        phases: tasks, clock, feet and learners of each phase.
+        phases: the table of two points.
         swing: shape of the swings. A foot has to move sideways too, and is not asked to be high.
         catches: a free robot has no run to break into.
         lateral: how the feet are placed sideways.
         noise_filter: of a state that is measured with noise; None: it is taken as it is measured.
-        step_width: lateral distance between left and right footholds [m]. Wider, and the
-            robot sways more than its slow steps bear; narrower, and a push leaves less room.
-        stop_share: joints slow down before their stops at any speed: hips that swing sideways
-            come to theirs slowly, with the robot's weight behind them.
+        step_width: lateral distance between left and right footholds [m]. Wider, and the robot
+            sways more than its slow steps bear; narrower, and a push leaves less room.
+        stop_share: joints slow down before their stops at any speed: hips that swing sideways come
+            to theirs slowly, with the robot's weight behind them.
         stop_horizon: a joint's speed is at most the way to its stop over this time [s].
     """
 
     kind: ClassVar[str] = "free"
+    planning: ClassVar[Planning] = Planning(FREE_PLANNER, BIPED_AHEAD)
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(FREE_PHASES))
     swing: SwingOptions | None = field(default_factory=SwingOptions)
@@ -254,12 +249,10 @@ class FreeOptions(EmbeddingOptions):
 
 @dataclass(frozen=True)
 class SoleOptions(FreeOptions):
-    """Tuning of the embedding of a robot on flat feet.
-
-    The fields of :class:`FreeOptions` come first.
+    """Tuning of a robot on flat feet; the fields of :class:`FreeOptions` come first.
 
     Attributes:
-        phases: tasks, clock, feet and learners of each phase.
+        phases: the table of soles.
         swing: shape of the swings; None: by the hips' speed, and the reference waits for the foot.
         replan: where hips are at their limits, the leg that they swing changes the CoM's speed by
             0.05 m/s within a step, and back; planned anew from there, TALOS walked 2.8 % too fast.
@@ -269,6 +262,8 @@ class SoleOptions(FreeOptions):
     """
 
     kind: ClassVar[str] = "soles"
+    # Ahead it held all 18 of G1's disturbed walks in which the LQR's search fell.
+    planning: ClassVar[Planning] = Planning(_SOLE_PLANNER, BIPED_AHEAD, True, bears=True)
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(SOLE_PHASES))
     swing: SwingOptions | None = None
@@ -279,12 +274,10 @@ class SoleOptions(FreeOptions):
 
 @dataclass(frozen=True)
 class TrotOptions(FreeOptions):
-    """Tuning of the embedding of a quadruped.
-
-    The fields of :class:`FreeOptions` come first.
+    """Tuning of a quadruped; the fields of :class:`FreeOptions` come first.
 
     Attributes:
-        phases: tasks, clock, feet and learners of each phase.
+        phases: the table of pairs of legs.
         lean: none: the trunk stays level.
         lateral: pairs of legs may cross, as a push may want them to.
         step_width: lateral distance between the footholds of both pairs [m]: none, as the middle of
@@ -292,6 +285,7 @@ class TrotOptions(FreeOptions):
     """
 
     kind: ClassVar[str] = "trot"
+    planning: ClassVar[Planning] = Planning(FREE_PLANNER, FREE_AHEAD, bears=True)
 
     phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(TROT_PHASES))
     lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
@@ -320,39 +314,3 @@ def default_options(robot: Biped) -> AnyOptions:
     """Options of a robot's kind."""
     free, trots = robot.directions > UP, len(robot.feet) > LEGS
     return options_of_kind(free=free, flat=bool(robot.patches), trots=trots)
-
-
-FREE_PLANNER = LqrOptions(earliest_touchdown=0.1, earliest_share=1.0, trusted_price=0.3)
-"""Tuning of a floating-base robot's LQR planner.
-
-Its swing leg has to move sideways too, and needs time. Its first steps from a start are further
-from the gait than a planar robot's, and the law of a slow gait is good in its neighbourhood only:
-at 0.4 m/s it led Bolt from an error of 2 mm to one of 0.1 m/s. So the search begins earlier.
-"""
-
-# A heavy leg needs longer to get in front. After a step up a foot was to land 0.08 s after VLO
-# (l0 = 0.67 m); it landed next to the other one, and G1 fell.
-_SOLE_PLANNER = replace(FREE_PLANNER, earliest_touchdown=0.15, earliest_share=0.2)
-
-
-class KindOfRobot(NamedTuple):
-    """Planners' tuning for a kind of robot.
-
-    ``walks_ahead``: whether a walk that is kept is planned ahead; ``bears``: whether its feet bear
-    the centre of pressure around them.
-    """
-
-    lqr: LqrOptions
-    ahead: AheadOptions
-    walks_ahead: bool = False
-    bears: bool = False
-
-
-KINDS: Mapping[str, KindOfRobot] = {
-    EmbeddingOptions.kind: KindOfRobot(LqrOptions(), AheadOptions()),
-    FreeOptions.kind: KindOfRobot(FREE_PLANNER, BIPED_AHEAD),
-    TrotOptions.kind: KindOfRobot(FREE_PLANNER, FREE_AHEAD, bears=True),
-    # Ahead it held all 18 of G1's disturbed walks in which the LQR's search fell.
-    SoleOptions.kind: KindOfRobot(_SOLE_PLANNER, BIPED_AHEAD, walks_ahead=True, bears=True),
-}
-"""By the kind of the controller's options."""

@@ -314,7 +314,7 @@ def test_a_stride_may_have_come_here_on_the_legs_of_the_gait(gait):
     supervisor.decide(VLO, sensed, 0.0, NOTHING)
     stiff = supervisor.decision.controls.copy()
     stiff[Slot.K_SC] *= 4.0
-    supervisor.set_decision(replace(supervisor.decision, controls=stiff))
+    supervisor.decision = replace(supervisor.decision, controls=stiff)
     stride = simulate_stride(P, node.name, VLO.state(gait.vlo), gait.controls)
     sensed.state[:] = stride.sample(0.1)[0][:4]
     supervisor.replan(Cause.DEVIATION, node, sensed, 0.1, phase_time=0.1)
