@@ -20,6 +20,7 @@ from template_control.embedding.planners.planner import (
     RestContext,
     decided,
     rest_decided,
+    settled,
 )
 from template_control.embedding.recovery import TO_REST, Recovery, entry, ways_to_rest
 from template_control.embedding.rollout import TemplateRollout
@@ -231,7 +232,7 @@ def choose_all_controls(
         z = rollout.backward_to_section(s.node, so_far, s.sensed)
         if z is None:
             return None
-        return decided(planner.decide, Context(z, s.goal.target, angles, s.cause, s.decision))
+        return decided(planner, Context(z, s.goal.target, angles, s.cause, s.decision))
 
     decision = decide(s.decision.controls)
     if decision is not None and decision.feasible:
@@ -425,8 +426,7 @@ def curve_or_step(
         other = planners.planners.get(way.stride)
         if other is None:
             continue
-        first = Decision(other.gait.controls, other.gait.state.copy(), True, True, False)
-        instead, rest = rollout.curve(way.entry, s.sensed, state, other, first)
+        instead, rest = rollout.curve(way.entry, s.sensed, state, other, settled(other.gait))
         if instead.feasible:
             goal = replace(s.goal, stride=way.stride, target=other.gait.state)
             return goal, instead, rest

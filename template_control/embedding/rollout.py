@@ -219,12 +219,12 @@ class RoutePlanners:
         from a state that does, and the robot is let down or pushed up to it.
         """
         planner = self.of(goal)
-        decision = decided(planner.decide, Context(z, goal.target))
+        decision = decided(planner, Context(z, goal.target))
         if decision.lasting:
             return decision, z
         for share in _CALMER:
             start = section.damped(z, share, _HIGHEST * self.route.parameters.rest_length)
-            damped = decided(planner.decide, Context(start, goal.target))
+            damped = decided(planner, Context(start, goal.target))
             if damped.lasting:  # from there; from here a run may be the better way
                 feasible = decision.feasible
                 return replace(damped, feasible=feasible, lasting=False, nominal=False), start
@@ -280,7 +280,7 @@ class TemplateRollout:
         so far; ``state`` (4,) is x, y, dx/dt, dy/dt. A ParameterError if the planner has none.
         """
         start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
-        return curved(planner.curve, node, start, _toes(sensed), decision)
+        return curved(planner, node, start, _toes(sensed), decision)
 
     def strides(
         self, node: Node, first: Stride, goal: StrideGoal, now: float
@@ -301,7 +301,7 @@ class TemplateRollout:
             z = section.of(last.state)
             then = self.planners.ahead(section, z, at) or self.planners.beyond(then, section)
             context = Context(z, then.target, cause=Cause.FUTURE)
-            ahead = decided(self.planners.of(then).decide, context)
+            ahead = decided(self.planners.of(then), context)
             whole = whole and ahead.lasting
             start = self.automaton.start(then.stride).name
             if start in self.curved:

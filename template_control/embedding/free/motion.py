@@ -273,7 +273,7 @@ class LateralMotion:
         z, target = supervisor.reports[-1].state, supervisor.goal.target
 
         def decide(least: float) -> Decision:
-            return decided(supervisor.planner.decide, Context(z, target, (least, inf)))
+            return decided(supervisor.planner, Context(z, target, (least, inf)))
 
         def follow(decision: Decision) -> Node:
             if decision is supervisor.decision:

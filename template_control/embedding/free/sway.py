@@ -16,8 +16,13 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import sample
-from template_control.embedding.standing.pressure import ARRIVE, SMOOTH, Pieces, pressure
-from template_control.embedding.standing.supports import UNLOADING
+from template_control.embedding.standing.pressure import (
+    ARRIVE,
+    SMOOTH,
+    UNLOADING,
+    Pieces,
+    pressure,
+)
 from template_control.robot.terms import onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.solver import SOLE_SHARE

@@ -6,11 +6,10 @@ from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, settling_map
+from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, lqr, settling_map
 from template_control.slip.automaton.vocabulary import Slot, StrideKind
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WALKING_SLOTS
@@ -106,9 +105,9 @@ def _rows(chain: Chain, p: SlipParameters) -> Array:
     scale = Scale.of(p)
     tolerance = np.array(scaled(LqrOptions(), scale).tolerance)
     unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
-    step = ReturnMap(p, STRIDE)
+    step, q = ReturnMap(p, STRIDE), np.diag(1.0 / np.square(STATE_TOLERANCE * scale.state))
+    r = np.diag(1.0 / CONTROL_TOLERANCE**2)
     rows = np.zeros((len(chain.height), WIDTH))
-    a, b = np.empty((len(rows), 3, 3)), np.empty((len(rows), 3, CONTROLS))
     for i, row in enumerate(rows):
         k = float(chain.stiffness[i]) * weight
         u = controls(float(chain.touchdown_angle[i]), k, k)
@@ -116,17 +115,11 @@ def _rows(chain: Chain, p: SlipParameters) -> Array:
         z = np.array([chain.vlo_speed[i] * unit, chain.height[i] * p.rest_length, 0.0])
         result, slopes, _ = step.derivatives(z, u, COLUMNS)
         units = np.array([1.0, *[k] * (CONTROLS - 1)])
-        a[i], b[i] = slopes[:3, :3], slopes[:3, 3:] * units
+        a, b = slopes[:3, :3].copy(), slopes[:3, 3:] * units
         row[STIFFNESS], row[STATE:CONTROL], row[CONTROL:COST] = k, z, u[SLOTS] / units
         row[STEP_LENGTH] = result[PADDED]
         row[STEP_DURATION] = row[STEP_LENGTH] / (chain.mean_speed[i] * unit)
-        shift = settling_map(a[i], b[i], tolerance, CONTROL_WEIGHT)
-        row[SETTLING:GAIN] = shift.ravel()
-    q = np.diag(1.0 / np.square(STATE_TOLERANCE * scale.state))
-    r = 1.0 / CONTROL_TOLERANCE**2
-    p_ahead = np.array([solve_discrete_are(*at, q, np.diag(r)) for at in zip(a, b, strict=True)])
-    weighted = np.swapaxes(b, 1, 2) @ p_ahead
-    gain = np.linalg.solve(np.diag(r) + weighted @ b, weighted @ a)
-    rows[:, COST:SETTLING] = p_ahead.reshape(-1, 9)
-    rows[:, GAIN:STEP_DURATION] = gain.reshape(len(rows), -1)
+        row[SETTLING:GAIN] = settling_map(a, b, tolerance, CONTROL_WEIGHT).ravel()
+        cost, gain = lqr(a, b, q, r)
+        row[COST:SETTLING], row[GAIN:STEP_DURATION] = cost.ravel(), gain.ravel()
     return rows

@@ -32,7 +32,7 @@ from template_control.embedding.planners.gait_table import (
     gait_row,
 )
 from template_control.embedding.planners.lqr import ANGLE_RANGE, STIFFNESS_RANGE
-from template_control.embedding.planners.step_search import TOP_MARGIN
+from template_control.embedding.planners.step_search import steepest
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.least_squares import bounded_step
 from template_control.slip.dynamics.model import Kernel
@@ -247,14 +247,12 @@ def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: 
             rows[i, j] = 0.0
     for i in range(steps):
         slots_of(plan, i, u)
+        # The present state is what it is.
+        skip, columns, jacobian = STATES, p.columns, by_both
         if i == 0:
-            # The present state is what it is.
-            found = Derivatives(result, by_control)
-            section_jacobian(p.kernel, EXACT, plan.states[i], u, p.columns[STATES:], work, found)
-        else:
-            found = Derivatives(result, by_both)
-            section_jacobian(p.kernel, EXACT, plan.states[i], u, p.columns, work, found)
-        skip = 0 if i == 0 else STATES
+            skip, columns, jacobian = 0, p.columns[STATES:], by_control
+        found = Derivatives(result, jacobian)
+        section_jacobian(p.kernel, EXACT, plan.states[i], u, columns, work, found)
         _chain(found.jacobian, 0, skip, plan, i, state, following)
         _chain(found.jacobian, REAR_BOTTOM, skip, plan, i, state, lengths)
         row = PER_STEP * i
@@ -320,14 +318,9 @@ def _bounds(
     if i == 0:
         lower[0] = min(max(lower[0], aim.angles[0]), upper[0])
         upper[0] = max(min(upper[0], aim.angles[1]), lower[0])
-    length, rise = p.kernel.rest_length, plan.states[i, 2]
-    top = np.arcsin(min(plan.states[i, 1] / length, 1.0)) - TOP_MARGIN
-    if p.earliest > 0.0:
-        stiff = plan.row[STIFFNESS] / p.kernel.mass
-        lift = stiff * (length - plan.states[i, 1]) - p.kernel.gravity
-        later = plan.states[i, 1] + p.earliest * (rise + 0.5 * p.earliest * lift)
-        top = min(top, np.arcsin(min(max(later / length, 0.0), 1.0)))
-    upper[first] = min(upper[first], max(top, TOP_MARGIN))
+    body = p.kernel.rest_length, p.kernel.mass, p.kernel.gravity
+    top = steepest(plan.states[i], body, plan.row[STIFFNESS], p.earliest)
+    upper[first] = min(upper[first], top)
     lower[first] = min(lower[first], upper[first])
 
 

@@ -18,12 +18,12 @@ from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.embedding.planners.planner import (
-    ANY_ANGLE,
     Cause,
     Context,
     Decision,
     Planner,
     RestContext,
+    learnt,
 )
 from template_control.embedding.planners.step_search import (
     EFFORT,
@@ -178,27 +178,29 @@ class LqrPlanner(Planner):
         self.offset: Array = np.zeros(3)
         self._family = GaitFamily(gait, other_walks)
         self._scratch = new_scratch()
-        self._pushes = int(Slot.K_PUSH) in control_units(gait)[0]
         self._slope = 0.0
         self._settle_on(gait)
 
     def _settle_on(self, gait: WalkingGait) -> None:
         """Make ``gait`` the one that the law leads to, on the present slope."""
-        self.gait = gait
-        gait = self._here = self._sloped()
-        self.a, self.b = vlo_jacobians(gait)
+        self.gait = here = gait
+        try:
+            here = on_slope(gait, self._slope)
+        except GaitError:
+            self._slope = 0.0
+        self._here, (self._slots, self._units) = here, control_units(here)
+        self._pushes = int(Slot.K_PUSH) in self._slots
+        self.a, self.b = vlo_jacobians(here)
         o = self.options
-        costs = (*o.control_cost, _PUSH_OFF_COST) if self._pushes else o.control_cost
-        self._costs = np.array(costs)
-        q, r = np.diag(o.state_cost), np.diag(costs)
-        self._cost = solve_discrete_are(self.a, self.b, q, r)
-        self._gain = np.linalg.solve(
-            r + self.b.T @ self._cost @ self.b, self.b.T @ self._cost @ self.a
-        )
-        self._change_weight = self._weight_of_change()
+        self._costs = np.array([*o.control_cost, _PUSH_OFF_COST][: len(self._slots)])
+        costs = np.diag(o.state_cost), np.diag(self._costs)
+        self._cost, self._gain = lqr(self.a, self.b, *costs)
+        # With push-off changes of the controls count more, the straighter the leg is at VLO.
+        bend = 1.0 - here.vlo[1] / here.parameters.rest_length
+        share = _STRAIGHT / bend if self._pushes else 0.0
+        self._change_weight = float(CONTROL_WEIGHT * (1.0 + share**2))
         self._settling = settling_map(self.a, self.b, np.array(o.tolerance), self._change_weight)
-        self._shift = self._settling @ self.offset
-        self._law = self._aim()
+        self._aim_anew()
 
     def __repr__(self) -> str:
         return f"<LqrPlanner on {self.gait!r}>"
@@ -217,8 +219,7 @@ class LqrPlanner(Planner):
         loses up to 0.04 m/s. What it adds to y and dy/dt is much the same.
         """
         self.offset = self.offset * _KEPT
-        self._shift = self._settling @ self.offset
-        self._law = self._aim()
+        self._aim_anew()
 
     def on_slope(self, slope: float) -> SlipParameters:
         """See :meth:`~.planner.Planner.on_slope`; without a gait there the ground is level."""
@@ -227,20 +228,15 @@ class LqrPlanner(Planner):
             self._settle_on(self.gait)
         return self._here.parameters
 
-    def _sloped(self) -> WalkingGait:
-        """The gait on the present slope."""
-        try:
-            return on_slope(self.gait, self._slope)
-        except GaitError:
-            self._slope = 0.0
-            return self.gait
+    def _aim_anew(self) -> None:
+        self._shift = self._settling @ self.offset
+        self._law = self._aim()
 
     def _aim(self) -> Law:
         """The linear law about the fixed point the robot has with the present offset."""
-        p, o = self._here.parameters, self.options
+        p, o, slots = self._here.parameters, self.options, self._slots
         shift = self._shift = self._settled()
-        slots, units = control_units(self._here)
-        nominal, others = self._here.controls[slots] / units, len(slots) - 1
+        nominal, others = self._here.controls[slots] / self._units, len(slots) - 1
         steps = _SECOND_PUSH_OFF_STEPS if self._pushes else _SECOND_STEPS
         relative_to = (nominal[0], *[0.0] * others)
         return Law(
@@ -266,12 +262,6 @@ class LqrPlanner(Planner):
             kernel=stride_kernel(p, self._here.stride),
         )
 
-    def _weight_of_change(self) -> float:
-        """Of the settled controls' changes: with push-off more, the straighter the leg at VLO."""
-        bend = 1.0 - self._here.vlo[1] / self._here.parameters.rest_length
-        share = _STRAIGHT / bend if self._pushes else 0.0
-        return float(CONTROL_WEIGHT * (1.0 + share**2))
-
     def _settled(self) -> Array:
         """(3 + c,) shift of the fixed point by the present offset.
 
@@ -282,7 +272,7 @@ class LqrPlanner(Planner):
         linear: Array = self._settling @ self.offset
         if not self._pushes:
             return linear
-        o, (slots, units) = self.options, control_units(self._here)
+        slots, units, tolerance = self._slots, self._units, np.array(self.options.tolerance)
         shift, step = self._shift, ReturnMap(self._here.parameters, self._here.stride)
         for _ in range(_ROUNDS):
             z, u = self._here.vlo + shift[:3], self._here.controls.copy()
@@ -292,7 +282,7 @@ class LqrPlanner(Planner):
                 return linear
             a, b = here.state_jacobian, here.control_jacobian[:, slots] * units
             rest = here.state + self.offset - z + shift[:3] - a @ shift[:3] - b @ shift[3:]
-            shift = settling_map(a, b, np.array(o.tolerance), self._change_weight) @ rest
+            shift = settling_map(a, b, tolerance, self._change_weight) @ rest
         return shift
 
     def decide(self, context: Context) -> Decision:
@@ -305,28 +295,21 @@ class LqrPlanner(Planner):
         gait, reachable = self._family.towards(self.gait, context.target)
         if gait is not self.gait:
             self._settle_on(gait)
-        law, angles = self._law, context.angles
-        if angles != ANY_ANGLE:
-            lower, upper = law.lower.copy(), law.upper.copy()
-            lower[0] = min(max(lower[0], angles[0]), upper[0])
-            upper[0] = max(min(upper[0], angles[1]), lower[0])
-            law = law._replace(lower=lower, upper=upper)
-        u, first, cost, nominal = self._best(law, context.z)
-        slots, units = control_units(self._here)
+        angles, lower, upper = context.angles, self._law.lower.copy(), self._law.upper.copy()
+        lower[0] = min(max(lower[0], angles[0]), upper[0])
+        upper[0] = max(min(upper[0], angles[1]), lower[0])
+        law = self._law._replace(lower=lower, upper=upper)
+        u, first = np.empty(len(lower)), np.empty(3)
+        cost, own = choose(law, self._scratch, context.z, u, first)
         controls = self._here.controls.copy()
-        controls[slots] = u * units
-        nominal = nominal and reachable
+        controls[self._slots] = u * self._units
+        nominal = own and reachable
         return Decision(controls, first, cost < 2.0 * FALL_PRICE, cost < FALL_PRICE, nominal)
 
     def cost(self, z: Array) -> float:
         """See :meth:`~.planner.Planner.cost`: with the step after the next."""
-        return self._best(self._law, z)[2]
-
-    def _best(self, law: Law, z: Array) -> tuple[Array, Array, float, bool]:
-        """Controls, where they lead, their price, and whether they are the linear law's."""
-        s, u, first = self._scratch, np.empty(len(law.slots)), np.empty(3)
-        cost, own = choose(law, s, z, u, first)
-        return u, first, cost, own
+        u, first = np.empty(len(self._slots)), np.empty(3)
+        return float(choose(self._law, self._scratch, z, u, first)[0])
 
     def decide_rest(self, context: RestContext) -> Decision | None:
         """See :meth:`~.planner.Planner.decide_rest`; nothing breaks into a walking step.
@@ -354,7 +337,6 @@ class LqrPlanner(Planner):
         # What the robot adds to a step has mostly come in by then. The cost-to-go of the end is the
         # square of its length times this.
         root: Array = np.linalg.cholesky(law.cost).T.astype(np.float64)
-
         prior = Prior(controls, slots, table, Search(_REST_ROUNDS))
         u, end = solve_stride(ahead, law.target, prior, root)
         if end is None:
@@ -367,11 +349,19 @@ class LqrPlanner(Planner):
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         if not (decision.feasible and decision.nominal):
             return  # far from the gait the surprise says little about it
-        limit = _SURPRISE_BOUND * self._scale.state
-        surprise = np.clip(z - decision.predicted, -limit, limit)
-        bound = _OFFSET_BOUND * self._scale.state
-        self.offset = np.clip(self.offset + self.options.offset_gain * surprise, -bound, bound)
+        unit, surprise = self._scale.state, z - decision.predicted
+        limits = _SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
+        self.offset = learnt(self.offset, surprise, self.options.offset_gain, limits)
         self._law = self._aim()
+
+
+def lqr(a: Array, b: Array, q: Array, r: Array) -> tuple[Array, Array]:
+    """Cost-to-go P (n, n) and gain K (c, n) of u = -K z for z_next = A z + B u.
+
+    ``q`` (n, n) and ``r`` (c, c) are costs of z and u.
+    """
+    cost = solve_discrete_are(a, b, q, r)
+    return cost, np.linalg.solve(r + b.T @ cost @ b, b.T @ cost @ a)
 
 
 def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, NotNegative, Positive
@@ -18,8 +17,6 @@ from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import GaitFamily, WalkingGait, without_push_off
 from template_control.slip.gaits.walking_by_speed import other_walks
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

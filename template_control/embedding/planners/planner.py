@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
 from math import isfinite, nan, pi
-from typing import Annotated, NamedTuple, ParamSpec, Protocol, runtime_checkable
+from typing import Annotated, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -22,9 +22,6 @@ from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
-
-P = ParamSpec("P")
-
 
 ANY_ANGLE = (-np.inf, np.inf)
 """Range of angles that leaves the touchdown angle free."""
@@ -51,6 +48,11 @@ class Decision(Checked):
     lasting: bool
     nominal: bool
     accepted: float | None = None
+
+
+def settled(gait: Gait) -> Decision:
+    """The decision of a gait that goes on, of which nothing is learnt."""
+    return Decision(gait.controls, gait.state.copy(), True, True, False)
 
 
 class Cause(Enum):
@@ -215,44 +217,39 @@ class Planner(Protocol):
         )
 
 
-def decided(method: Callable[P, Decision], *args: P.args, **kwargs: P.kwargs) -> Decision:
-    """Decision of a planner's method, which a stride can be made with.
+def decided(planner: Planner, context: Context) -> Decision:
+    """Decision of a planner for a whole stride, which it can be made with.
 
     A ParameterError names the planner's class, if it is no decision or its controls are not finite.
     """
-    decision = answered(Decision, method, *args, **kwargs)
-    _check_controls(method, decision)
-    return decision
+    return _followable(planner.decide, answered(Decision, planner.decide, context))
 
 
 def rest_decided(planner: Planner, context: RestContext) -> Decision | None:
     """Decision of a planner for the rest of a stride, checked as :func:`decided`, or None."""
     decision = answered_or_none(Decision, planner.decide_rest, context)
-    if decision is not None:
-        _check_controls(planner.decide_rest, decision)
-    return decision
+    return None if decision is None else _followable(planner.decide_rest, decision)
 
 
 def curved(
-    method: Callable[P, tuple[Decision, Stride]], *args: P.args, **kwargs: P.kwargs
+    planner: Planner, node: str, start: Array, toes: tuple[float, float], so_far: Decision
 ) -> tuple[Decision, Stride]:
     """A planner's decision along a curve, and the stride from there, by its :meth:`Planner.curve`.
 
     A ParameterError names the planner's class, if it returns something else.
     """
-    pair = answered(tuple, method, *args, **kwargs)
-    kinds = tuple(type(part) for part in pair)
-    if len(kinds) != 2 or not (issubclass(kinds[0], Decision) and issubclass(kinds[1], Stride)):
-        names = ", ".join(kind.__name__ for kind in kinds)
-        raise ParameterError(
-            f"{name_of(method)} returned a tuple of {names or 'nothing'}: return a Decision and a"
-            " Stride"
-        )
-    _check_controls(method, pair[0])
-    return pair
+    pair = answered(tuple, planner.curve, node, start, toes, so_far)
+    match pair:
+        case (Decision() as decision, Stride() as stride):
+            return _followable(planner.curve, decision), stride
+    names = ", ".join(type(part).__name__ for part in pair)
+    raise ParameterError(
+        f"{name_of(planner.curve)} returned a tuple of {names or 'nothing'}: return a Decision and"
+        " a Stride"
+    )
 
 
-def _check_controls(method: Callable[..., object], decision: Decision) -> None:
+def _followable(method: Callable[..., object], decision: Decision) -> Decision:
     controls = decision.controls.tolist()
     if not isfinite(sum(controls)):
         raise ParameterError(
@@ -263,6 +260,17 @@ def _check_controls(method: Callable[..., object], decision: Decision) -> None:
             f"{name_of(method)} returned the touchdown angle {controls[Slot.TOUCHDOWN_ANGLE]:g}:"
             " return one from 0 to pi, in rad"
         )
+    return decision
+
+
+def learnt(offset: Array, surprise: Array, gain: float, limits: tuple[Array, Array]) -> Array:
+    """The estimate (n,) of what the robot adds to a stride, after one with a surprise (n,).
+
+    Its share ``gain`` enters. ``limits`` are what a larger surprise counts as, and the largest
+    estimate.
+    """
+    limit, bound = limits
+    return np.clip(offset + gain * np.clip(surprise, -limit, limit), -bound, bound)
 
 
 Planners = Mapping[str, Planner]

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
+from template_control.embedding.planners.planner import Context, Decision, Planner
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome, Slot
-from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
+
+_LEFT_ALONE = ("decide_rest", "observe", "forget", "cost", "next_gait", "curve")
+"""What the planner itself answers."""
 
 
 class ResidualPlanner(Planner):
@@ -35,6 +37,8 @@ class ResidualPlanner(Planner):
         self.planner = planner
         self.residual = np.zeros(NUM_SLOTS)
         self._map = ReturnMap(planner.gait.parameters, planner.gait.stride)
+        for name in _LEFT_ALONE:
+            setattr(self, name, getattr(planner, name))
 
     def __repr__(self) -> str:
         return f"<residual on {self.planner!r}>"
@@ -71,35 +75,9 @@ class ResidualPlanner(Planner):
             return decision  # the template falls with the residual, and not without it
         return replace(decision, controls=u, predicted=end + self.offset[: len(end)])
 
-    def decide_rest(self, context: RestContext) -> Decision | None:
-        """See :meth:`Planner.decide_rest`."""
-        return self.planner.decide_rest(context)
-
-    def observe(self, decision: Decision, z: Array) -> None:
-        """See :meth:`Planner.observe`."""
-        self.planner.observe(decision, z)
-
-    def forget(self) -> None:
-        """See :meth:`Planner.forget`."""
-        self.planner.forget()
-
-    def cost(self, z: Array) -> float:
-        """See :meth:`Planner.cost`."""
-        return self.planner.cost(z)
-
-    def next_gait(self) -> Gait | None:
-        """See :meth:`Planner.next_gait`."""
-        return self.planner.next_gait()
-
     def on_slope(self, slope: float) -> SlipParameters | None:
         """See :meth:`Planner.on_slope`."""
         found = self.planner.on_slope(slope)
         if found is not None:
             self._map = ReturnMap(found, self.gait.stride)
         return found
-
-    def curve(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
-        """See :meth:`Planner.curve`."""
-        return self.planner.curve(node, start, toes, decision)

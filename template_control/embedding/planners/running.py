@@ -16,7 +16,7 @@ from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, Positive
 from template_control.compiled import compiled
-from template_control.embedding.planners.planner import Cause, Context, Decision, Planner
+from template_control.embedding.planners.planner import Cause, Context, Decision, Planner, learnt
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import (
@@ -206,7 +206,6 @@ class RunningPlanner(Planner):
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal strides teach."""
         if not (decision.feasible and decision.nominal):
             return
-        unit = self._scale.state[:2]
-        limit, bound = SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
-        surprise = np.clip(z[:2] - decision.predicted[:2], -limit, limit)
-        self.offset[:2] = np.clip(self.offset[:2] + OFFSET_GAIN * surprise, -bound, bound)
+        unit, surprise = self._scale.state[:2], z[:2] - decision.predicted[:2]
+        limits = SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
+        self.offset[:2] = learnt(self.offset[:2], surprise, OFFSET_GAIN, limits)

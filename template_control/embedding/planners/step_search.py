@@ -108,21 +108,31 @@ def copy(source: Array, target: Array) -> None:
 
 
 @compiled
-def bounded(law: Law, z: Array, u: Array) -> None:
-    """Clip ``u`` (c,), alpha [rad] and stiffnesses/k0, to what is admissible at a VLO state z (3,).
+def steepest(
+    z: Array, body: tuple[float, float, float], stiffness: float, earliest: float
+) -> float:
+    """Largest touchdown angle at a VLO state z (3,) [rad].
 
-    The height a short time after VLO, the law's ``earliest``, comes from its Taylor series to the
-    second order.
+    The foot is neither on the ground at once, nor ``earliest`` after VLO [s]: the height then comes
+    from its Taylor series to the second order. ``body`` are l0, m and g, the leg has a stiffness
+    [N/m].
     """
+    length, mass, gravity = body
+    top = np.arcsin(min(z[1] / length, 1.0)) - TOP_MARGIN
+    if earliest > 0.0:
+        lift = stiffness / mass * (length - z[1]) - gravity
+        later = z[1] + earliest * (z[2] + 0.5 * earliest * lift)
+        top = min(top, np.arcsin(min(max(later / length, 0.0), 1.0)))
+    return float(max(top, TOP_MARGIN))
+
+
+@compiled
+def bounded(law: Law, z: Array, u: Array) -> None:
+    """Clip ``u`` (c,), alpha [rad] and stiffnesses/k0, to what is admissible at z (3,)."""
     for i in range(u.shape[0]):
         u[i] = min(max(u[i], law.lower[i]), law.upper[i])
-    length, t = law.kernel.rest_length, law.earliest
-    top = np.arcsin(min(z[1] / length, 1.0)) - TOP_MARGIN
-    if t > 0.0:
-        lift = u[1] * law.stiffness / law.kernel.mass * (length - z[1]) - law.kernel.gravity
-        later = z[1] + t * (z[2] + 0.5 * t * lift)
-        top = min(top, np.arcsin(min(max(later / length, 0.0), 1.0)))
-    u[0] = min(u[0], max(top, TOP_MARGIN))
+    body = law.kernel.rest_length, law.kernel.mass, law.kernel.gravity
+    u[0] = min(u[0], steepest(z, body, u[1] * law.stiffness, law.earliest))
 
 
 @compiled

@@ -184,7 +184,7 @@ class TransitionPlanner(Planner):
         low, high = np.array(o.bounds).T
         lower = np.where(turns, base + low, base * low)
         upper = np.where(turns, base + high, base * high)
-        controls = decided(self._before.decide, Context(z)).controls.copy()
+        controls = decided(self._before, Context(z)).controls.copy()
         if angles[0] == angles[1]:
             controls[Slot.TOUCHDOWN_ANGLE] = angles[0]
             lower[turns] = upper[turns] = angles[0]

@@ -15,7 +15,13 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.embedding.free.catching import CatchingStep
-from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
+from template_control.embedding.planners.planner import (
+    Context,
+    Decision,
+    Planner,
+    RestContext,
+    settled,
+)
 from template_control.embedding.standing.curves import (
     PLACE,
     BetweenFeet,
@@ -26,14 +32,14 @@ from template_control.embedding.standing.curves import (
 from template_control.embedding.standing.passes import (
     NIMBLE,
     STEP_DURATION,
-    LandingTable,
     PassTable,
     SingleSupportPass,
-    StepPass,
+    StepLanding,
     Touchdown,
-    width_price,
+    shifted,
+    states_at,
 )
-from template_control.embedding.standing.supports import curve_over
+from template_control.embedding.standing.pressure import curve_over
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
@@ -49,6 +55,7 @@ _CURVED = (
     StrideKind.WALK_TO_STAND,
     StrideKind.CHANGE_SPEED,
 )
+_STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)
 _TRIALS = 6  # of speeds, where a step's angle is chosen
 BEAT = 0.5
 """A stand is planned anew, and the route asked, after this time [s], for the reference template; a
@@ -62,11 +69,10 @@ _SOON = 1e-3  # [s]
 _LAUNCH = 0.05
 
 
-def standing_gait(passes: PassTable) -> Gait:
-    """A stand as a gait: a stride that returns to its state, in a beat; no spring carries."""
-    state = np.array([0.0, passes.options.height, 0.0])
-    beat, none = BEAT * passes.scale.time, np.zeros(NUM_SLOTS)
-    return Gait("standing", passes.parameters, state, none, 0.0, beat, StrideKind.STAND)
+def standing_gait(passes: PassTable, stride: str, duration: float) -> Gait:
+    """A stand as a gait: a stride that returns to its state in a time [s]; no spring carries."""
+    state, none = np.array([0.0, passes.options.height, 0.0]), np.zeros(NUM_SLOTS)
+    return Gait("standing", passes.parameters, state, none, 0.0, duration, stride)
 
 
 class CurvePlanner(Planner):
@@ -89,7 +95,7 @@ class CurvePlanner(Planner):
         self._beat = BEAT * passes.scale.time
         self._launch = _LAUNCH * passes.parameters.rest_length
         self._speed = 0.0  # at VLO, to which the last curve leads [m/s]
-        stand = standing_gait(passes)
+        stand = standing_gait(passes, StrideKind.STAND, self._beat)
         self.gait: Gait = stand if walk is None else walk.gait
 
     def reset(self) -> None:
@@ -112,14 +118,17 @@ class CurvePlanner(Planner):
             return Decision(u, np.array(target), True, True, False)
         steps = self._passes.touchdowns(z, angles)
         if self._rests:
-            return self._step(min(steps, key=self._rest_price, default=None), self.gait.state, 0.0)
-        present = float(z[0])
-        speeds = self._passes.between(present if target is None else float(target[0]), present)
-        if not steps:
-            over = self._passes.at(speeds[0])
-            return self._step(None, over.vlo, over.stiffness)
-        step, over = self._towards(steps, speeds[:: 1 + len(speeds) // _TRIALS])
-        return self._step(step, over.vlo, over.stiffness)
+            step = min(steps, key=self._rest_price, default=None)
+            end, stiffness = self.gait.state, 0.0
+        else:
+            present = float(z[0])
+            wanted = present if target is None else float(target[0])
+            step, over = self._towards(steps, self._passes.between(wanted, present))
+            end, stiffness = over.vlo, over.stiffness
+        k0 = self._passes.parameters.leg_stiffness
+        angle, before = (_STEEP, k0) if step is None else step[:2]
+        u = controls(angle, before, stiffness)
+        return Decision(u, end.copy(), step is not None, True, False)
 
     def next_gait(self) -> Gait | None:
         """See :meth:`~.planner.Planner.next_gait`."""
@@ -143,39 +152,38 @@ class CurvePlanner(Planner):
         u = decision.controls.copy()
         u[Slot.K_SD] = over.stiffness
         first = timed_stride(AUTOMATON, node, found.pieces, toes)
-        second = self._passes.arriving(first.node, liftoff[:, :2].T.ravel(), u, first.toes)
+        second = self._passes.arriving(first.node, liftoff, u, first.toes)
         speed = self._speed = float(over.vlo[0])
-        accepted = None if speed == decision.predicted[0] else speed
         slowest = self._passes.options.slowest
         lasts = found.excess <= self._launch if self._lands else speed >= slowest
-        chosen = replace(decision, controls=u, feasible=lasts and feet.fits(found), lasting=lasts)
-        return replace(chosen, accepted=accepted), chained(first, second)
-
-    def _step(self, step: Touchdown | None, end: Array, stiffness: float) -> Decision:
-        """The decision for a step (None: there is none) to a state ``end`` (3,)."""
-        k0 = self._passes.parameters.leg_stiffness
-        angle, before = (_STEEP, k0) if step is None else step[:2]
-        u = controls(angle, before, stiffness)
-        return Decision(u, end.copy(), step is not None, True, False)
+        chosen = replace(
+            decision,
+            controls=u,
+            feasible=lasts and feet.fits(found),
+            lasting=lasts,
+            accepted=None if speed == decision.predicted[0] else speed,
+        )
+        return chosen, chained(first, second)
 
     def _price(self, step: Touchdown, found: Found) -> float:
         """Of a step and the curve after it [m]."""
-        return found.cost + width_price(step.toes[1], self._passes.parameters)
+        return found.cost + self._passes.width_price(step.toes[1])
 
     def _rest_price(self, step: Touchdown) -> float:
         return self._price(step, self._passes.feet(step.toes).to_rest(step.state, True))
 
     def _towards(
         self, steps: list[Touchdown], speeds: list[float]
-    ) -> tuple[Touchdown, SingleSupportPass]:
+    ) -> tuple[Touchdown | None, SingleSupportPass]:
         """The step after which the first of the speeds can be had, and the VLO it leads to."""
-        best = (np.inf, steps[0], self._passes.at(speeds[0]))
-        for speed in speeds:
+        best: tuple[float, Touchdown | None, SingleSupportPass]
+        best = np.inf, None, self._passes.at(speeds[0])
+        for speed in speeds[:: 1 + len(speeds) // _TRIALS] if steps else ():
             over = self._passes.at(speed)
             fits = False
             for step in steps:
                 feet = self._passes.feet(step.toes)
-                ends = self._passes.approach(over, step.toes[1])
+                ends = shifted(over.way, step.toes[1])
                 found, _ = feet.to_liftoff(step.state, ends, True)
                 fits = fits or feet.fits(found)
                 price = self._price(step, found)
@@ -194,7 +202,7 @@ class CurvePlanner(Planner):
             wanted, present = max(wanted, self._passes.options.slowest), 0.0
         for speed in self._passes.between(wanted, present):
             over = self._passes.at(speed)
-            ends = self._passes.approach(over, feet.toes[1])
+            ends = shifted(over.way, feet.toes[1])
             found, i = feet.to_liftoff(start, ends, self._lands)
             ways.append((found, over, ends[i]))
             if feet.fits(found):
@@ -203,16 +211,20 @@ class CurvePlanner(Planner):
 
 
 class Away(NamedTuple):
-    """A curve to a liftoff, and the pass from there.
+    """A curve to a liftoff (2, 3), and the landing after it; ``price`` is of both [m].
 
-    ``liftoff`` (2, 3) is x and y there, each position, velocity and acceleration; ``price`` is of
-    all [m].
+    The leg that stays between them has a stiffness [N/m].
     """
 
     found: Found
-    over: StepPass
     liftoff: Array
+    stiffness: float
+    landing: StepLanding
     price: float
+
+
+_Made = tuple[Array, bool, Stride]
+"""Controls of the rest of a step, whether it can be made, and its stride."""
 
 
 class StepPlanner(Planner):
@@ -221,12 +233,9 @@ class StepPlanner(Planner):
     Args:
         passes: over a leg.
         stride: which of the automaton's it makes; the first leg to lift off gives its direction.
-        landings: of another such planner, to share; None: its own.
     """
 
-    def __init__(
-        self, passes: PassTable, stride: str, landings: LandingTable | None = None
-    ) -> None:
+    def __init__(self, passes: PassTable, stride: str) -> None:
         first = AUTOMATON.start(stride)
         ahead = first.edge(Event.REAR_LIFTOFF) is not None
         self._way = 1.0 if ahead else -1.0
@@ -237,68 +246,21 @@ class StepPlanner(Planner):
             self._single: self._swing,
             AUTOMATON.successor(self._single, Event.TOUCHDOWN): self._rest,
         }
-        self._passes = passes
+        self._passes, self._steps = passes, passes.steps
         self._launch = _LAUNCH * passes.parameters.rest_length
         self._beat = BEAT * passes.scale.time
-        self.landings = landings or LandingTable(passes, self._single)
-        gait = standing_gait(passes)
-        duration = STEP_DURATION * passes.scale.time
-        self.gait: Gait = replace(gait, stride=stride, step_duration=duration)
+        self.gait: Gait = standing_gait(passes, stride, STEP_DURATION * passes.scale.time)
 
     def decide(self, context: Context) -> Decision:
         """See :class:`~.planner.Planner`: what is chosen depends on the feet, so ``curve`` does."""
-        return Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
+        return settled(self.gait)
 
     def curve(
         self, node: str, start: Array, toes: tuple[float, float], decision: Decision
     ) -> tuple[Decision, Stride]:
         """See :meth:`~.planner.Planner.curve`."""
-        return self._ways[node](node, start, toes, decision)
-
-    def _lift(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
-        """Both feet stand: to the liftoff from which the step ends best."""
-        ahead = self._turned(start)
-        feet = self._passes.feet(toes if self._way > 0.0 else (-toes[1], -toes[0]))
-        away = self._best_away(feet, ahead)
-        u = self._controls(away.over.landing.angle, away.over.stiffness)
-        first = timed_stride(AUTOMATON, node, self._back(away.found.pieces), toes)
-        state = self._turned(away.liftoff)[:, :2].T.ravel()
-        stands = first.toes if self._way > 0.0 else np.array(toes)
-        second, _ = self._landed(state, u, stands)
-        middle = feet.place(PLACE) - feet.margin
-        fits = away.found.excess <= self._launch and self.landings.capture(ahead) >= middle
-        return replace(decision, controls=u, feasible=fits), chained(first, second)
-
-    def _best_away(self, feet: BetweenFeet, start: Array) -> Away:
-        """The curve to a liftoff, forward, after which the step ends best."""
-        ways, nimble = [], NIMBLE * self._passes.scale.speed
-        for over in self.landings.known:
-            far = feet.spacing + over.landing.toe
-            in_time = over.landing.time - over.times >= far / nimble
-            in_time[0] = True  # whatever it is, it has to do
-            ends = over.states[in_time].copy()
-            ends[:, 0, 0] += feet.toes[1]
-            for loads in (True, False):
-                found, i = feet.to_liftoff(start, ends, loads)
-                ways.append(Away(found, over, ends[i], found.cost + over.landing.price))
-                if feet.fits(found):
-                    break
-        if not any(feet.fits(away.found) for away in ways):
-            ways += self._at_once(feet, start)
-        return min(ways, key=lambda away: away.price)
-
-    def _at_once(self, feet: BetweenFeet, start: Array) -> list[Away]:
-        """The liftoff that is made now: the CoM may be past the foot that stays."""
-        stiffness = self.landings.carrying(start, feet.toes[1])
-        best = self.landings.best(start, stiffness, feet.toes[::-1])
-        if best is None:
-            return []
-        soon = self._straight(start)
-        price = self.landings.hurried(best, feet.toes[0])
-        over = StepPass(stiffness, np.zeros(0), np.zeros(0), best)
-        return [Away(Found((soon,), 0.0, 0.0), over, soon.end(), price)]
+        u, feasible, stride = self._ways[node](node, start, toes, decision.controls)
+        return replace(decision, controls=u, feasible=feasible), stride
 
     def catch(
         self, node: str, start: Array, toes: tuple[float, float], step: CatchingStep
@@ -313,7 +275,7 @@ class StepPlanner(Planner):
         """
         lifts = None
         if node != self._single:
-            soon = self._straight(start)
+            soon = _straight(start)
             lifts = timed_stride(AUTOMATON, node, [soon], toes)
             start, toes = soon.end(), toes if self._way < 0.0 else toes[::-1]
         end = np.array([[0.0, 0.0, 0.0], [self.gait.state[1], 0.0, 0.0]])
@@ -323,46 +285,70 @@ class StepPlanner(Planner):
         pressures = np.full(_CATCHING, step.pressure)
         pieces = curve_over(start, end, step.lasts, pressures, rates)
         over = timed_stride(AUTOMATON, self._single, pieces, (toes[0], np.nan))
-        both = toes[0], step.foothold
-        so_far = Decision(self.gait.controls, self.gait.state.copy(), True, True, False)
-        decision, rests = self._rest(over.node, pieces[-1].end(), both, so_far)
+        both, first = (toes[0], step.foothold), settled(self.gait)
+        _, feasible, rests = self._rest(over.node, pieces[-1].end(), both, first.controls)
         stride = chained(replace(over, toes=np.array(both)), rests)
+        decision = replace(first, feasible=feasible)
         return decision, stride if lifts is None else chained(lifts, stride)
 
-    def _swing(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
+    def _lift(self, node: str, start: Array, toes: tuple[float, float], u: Array) -> _Made:
+        """Both feet stand: to the liftoff from which the step ends best."""
+        ahead = self._turned(start)
+        feet = self._passes.feet(toes if self._way > 0.0 else (-toes[1], -toes[0]))
+        away = self._best_away(feet, ahead)
+        u = self._controls(away.landing.angle, away.stiffness)
+        first = timed_stride(AUTOMATON, node, self._back(away.found.pieces), toes)
+        stands = first.toes if self._way > 0.0 else np.array(toes)
+        second, _ = self._landed(self._turned(away.liftoff), u, stands)
+        middle = feet.place(PLACE) - feet.margin
+        fits = away.found.excess <= self._launch and self._passes.capture(ahead) >= middle
+        return u, fits, chained(first, second)
+
+    def _best_away(self, feet: BetweenFeet, start: Array) -> Away:
+        """The curve to a liftoff, forward, after which the step ends best."""
+        passes, ways = self._passes, []
+        nimble = NIMBLE * passes.scale.speed
+        for stiffness, times, states, landing in self._steps:
+            far = feet.spacing + landing.toe
+            in_time = landing.time - times >= far / nimble
+            in_time[0] = True  # whatever it is, it has to do
+            ends = shifted(states[in_time], feet.toes[1])
+            for loads in (True, False):
+                found, i = feet.to_liftoff(start, ends, loads)
+                ways.append(Away(found, ends[i], stiffness, landing, found.cost + landing.price))
+                if feet.fits(found):
+                    break
+        if not any(feet.fits(away.found) for away in ways):
+            # At once: the CoM may be past the foot that stays.
+            stiffness = passes.carrying(start, feet.toes[1])
+            best = passes.best_landing(start, stiffness, feet.toes[::-1])
+            if best is not None:
+                soon, price = _straight(start), passes.hurried(best, feet.toes[0])
+                now = Found((soon,), 0.0, 0.0)
+                ways.append(Away(now, soon.end(), stiffness, best, price))
+        return min(ways, key=lambda away: away.price)
+
+    def _swing(self, node: str, start: Array, toes: tuple[float, float], u: Array) -> _Made:
         """One foot stands: to the landing after which the CoM comes to rest best.
 
         The foot cannot take it up where the CoM falls to the other side. A leg whose stiffness
         nobody has chosen yet carries the weight.
         """
-        ahead = self._turned(start)
+        passes, ahead = self._passes, self._turned(start)
         foot = (self._way * toes[0], self._way * toes[1])
-        stiffness = float(decision.controls[Slot.K_SC]) or self.landings.carrying(ahead, foot[0])
-        best = self.landings.best(ahead, stiffness, foot)
-        u = decision.controls
+        stiffness = float(u[Slot.K_SC]) or passes.carrying(ahead, foot[0])
+        best = passes.best_landing(ahead, stiffness, foot)
         if best is not None:
             u = self._controls(best.angle, stiffness)
-        stride, landed = self._landed(start[:, :2].T.ravel(), u, np.array(toes))
-        falls = self.landings.capture(ahead) > foot[0]
-        return replace(decision, controls=u, feasible=landed and falls), stride
+        stride, landed = self._landed(start, u, np.array(toes))
+        return u, landed and passes.capture(ahead) > foot[0], stride
 
-    def _rest(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
-    ) -> tuple[Decision, Stride]:
+    def _rest(self, node: str, start: Array, toes: tuple[float, float], u: Array) -> _Made:
         """The foot has landed: the curve to rest, seen in the direction of the step."""
         feet = self._passes.feet((self._way * toes[0], self._way * toes[1]))
         found = feet.to_rest(self._turned(start), True)
         pieces = self._back(with_rest(found.pieces, self._beat))
-        stride = timed_stride(AUTOMATON, node, pieces, toes)
-        return replace(decision, feasible=feet.fits(found)), stride
-
-    def _straight(self, start: Array) -> Quintic:
-        """A moment from a start (2, 3), in which the CoM moves on."""
-        on = np.zeros((2, TERMS))
-        on[:, :2] = start[:, :2]
-        return Quintic(on, _SOON)
+        return u, feet.fits(found), timed_stride(AUTOMATON, node, pieces, toes)
 
     def _turned(self, state: Array) -> Array:
         """(2, 3) x and y with their derivatives, seen in the direction of the step."""
@@ -374,18 +360,14 @@ class StepPlanner(Planner):
 
     def _controls(self, angle: float, stiffness: float) -> Array:
         """Controls of a step with a touchdown angle as seen in its direction."""
-        u = np.zeros(NUM_SLOTS)
-        u[Slot.TOUCHDOWN_ANGLE] = angle if self._way > 0.0 else np.pi - angle
-        u[Slot.K_SC] = stiffness
-        return u
+        return controls(angle if self._way > 0.0 else np.pi - angle, stiffness, 0.0)
 
     def _landed(self, state: Array, u: Array, toes: Array) -> tuple[Stride, bool]:
-        """The stride from single stance to rest, and whether the foot lands."""
+        """The stride from single stance (2, 3) to rest, and whether the foot lands."""
         stride = self._passes.arriving(self._single, state, u, toes)
-        events = [event for event in stride.events if event.event is Event.TOUCHDOWN]
-        if not events:
+        landing = next((e for e in stride.events if e.event is Event.TOUCHDOWN), None)
+        if landing is None:
             return stride, False
-        landing = events[0]
         rows = int(np.searchsorted(stride.meta[:, 0], landing.time - 1e-12))
         foot = float(landing.state[0] + self._passes.parameters.rest_length * np.cos(u[0]))
         both = (float(toes[0]), foot)
@@ -401,10 +383,16 @@ class StepPlanner(Planner):
             cy=stride.cy[:rows],
             meta=stride.meta[:rows],
         )
-        end = stride.sample(np.nextafter(landing.time, 0.0))[0].reshape(3, 2).T
-        so_far = Decision(u, self.gait.state, True, True, False)
-        _, rest = self._rest(landing.target, end, both, so_far)
+        end = states_at(stride, np.nextafter(landing.time, 0.0))[0]
+        *_, rest = self._rest(landing.target, end, both, u)
         return chained(cut, rest), True
+
+
+def _straight(start: Array) -> Quintic:
+    """A moment from a start (2, 3), in which the CoM moves on."""
+    on = np.zeros((2, TERMS))
+    on[:, :2] = start[:, :2]
+    return Quintic(on, _SOON)
 
 
 def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
@@ -448,9 +436,5 @@ def standing_planners(
     gaits = family or paper_walks(parameters)
     o = scaled(options or StandingOptions(), Scale.of(parameters))
     passes = PassTable(parameters, o, gaits)
-    forward = StepPlanner(passes, StrideKind.STEP_FORWARD)
-    return {
-        **{kind: CurvePlanner(passes, kind) for kind in _CURVED},
-        StrideKind.STEP_FORWARD: forward,
-        StrideKind.STEP_BACK: StepPlanner(passes, StrideKind.STEP_BACK, forward.landings),
-    }
+    curves: dict[str, Planner] = {kind: CurvePlanner(passes, kind) for kind in _CURVED}
+    return curves | {kind: StepPlanner(passes, kind) for kind in _STEPS}

@@ -16,19 +16,24 @@ a quadratic program with bounds, which :func:`bounded` solves.
 
 from __future__ import annotations
 
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.slip.dynamics.timed import TERMS, polynomial, quintic
+from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial, quintic
 from template_control.warm_up import Part
 
 SMOOTH = 0.1
 """T, over which p is to change [s, of the reference template]."""
 ARRIVE = 2000.0
 """R, what an error at the end costs [s, of the reference template]."""
+UNLOADING = 0.06
+"""Time over which a foot that is to lift off gives up its load [s, of the reference template]."""
+LIGHTEST = 0.05
+"""Least load of the legs, over the weight: they do not pull."""
 _ROUNDS = 30  # of the active set
 _HELD = 1e-9  # [m]: a bound that is nearer holds
 # Largest w times the duration that is planned with, about twice that of a CoM that stays up. One
@@ -177,7 +182,7 @@ class Ground(NamedTuple):
     Attributes:
         rear, front: x of the feet [m].
         low, high: x between which both together bear the centre of pressure [m].
-        gravity: g [m/s^2].
+        gravity: its parts away from the ground and along it, backward [m/s^2].
         reach: longest way from a foot to the CoM [m].
         slack: excess that costs nothing [m].
         pace: price of a second more or less than ``calm`` [m/s].
@@ -190,7 +195,7 @@ class Ground(NamedTuple):
     front: float
     low: float
     high: float
-    gravity: float
+    gravity: tuple[float, float]
     reach: float
     slack: float
     pace: float
@@ -198,9 +203,6 @@ class Ground(NamedTuple):
     unloading: float
     smooth: float
     arrive: float
-
-
-_LIGHTEST = 0.05  # of the weight: legs do not pull
 
 
 @compiled
@@ -216,7 +218,7 @@ def best_pressure(
     Centres of pressure ``p`` (k,) and w ``rates`` (k,) of the pieces are overwritten; also returns
     the numbers of the end and of the duration.
     """
-    n = p.shape[0]
+    n, g = p.shape[0], ground.gravity[0]
     best, least, chosen, lasting, fits = np.inf, np.inf, 0, 0, False
     rise, low, high = np.empty(TERMS), np.empty(n), np.empty(n)
     wish, lasts, rate, found = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
@@ -231,8 +233,8 @@ def best_pressure(
             for k in range(n):
                 lasts[k] = t / n
                 y, _, lift = polynomial(rise, (k + 0.5) * t / n)
-                lift = max(ground.gravity + lift, _LIGHTEST * ground.gravity)
-                rate[k] = np.sqrt(lift / max(y, _LIGHTEST * ground.reach))
+                lift = max(g + lift, LIGHTEST * g)
+                rate[k] = np.sqrt(lift / max(y, LIGHTEST * ground.reach))
                 wish[k], left = goal, 1.0
                 if ground.unloading > 0.0:
                     left = min((n - k - 1) * t / n / ground.unloading, 1.0)
@@ -266,10 +268,38 @@ def _after(x: float, v: float, w: float, p: float, dt: float) -> tuple[float, fl
     return p + c * (x - p) + s / w * v, w * s * (x - p) + c * v
 
 
+def curve_over(
+    start: Array, end: Array, duration: float, pressures: Array, rates: Array
+) -> tuple[Quintic, ...]:
+    """The curve of a duration [s] over centres of pressure (n,) [m], w (n,) being ``rates``."""
+    rise = Quintic.between(start, end, duration).coefficients[1]
+    (x, v), dt, time = start[0, :2], duration / len(rates), 0.0
+    found = []
+    for p, w in zip(pressures, rates, strict=True):
+        c = np.empty((2, TERMS))
+        for n in range(TERMS):  # of p + (x - p) cosh(w t) + v sinh(w t) / w
+            c[0, n] = (v if n % 2 else x - p) * w ** (n - n % 2) / factorial(n)
+        c[0, 0], c[1] = x, _from(rise, time)
+        found.append(Quintic(c, dt))
+        x, v, _ = polynomial(c[0], dt)
+        time += dt
+    return tuple(found)
+
+
+def _from(polynomial: Array, time: float) -> Array:
+    """The same polynomial (n,), its time counted from another one [s] on."""
+    c = polynomial.copy()
+    for i in range(len(c) - 1):
+        for k in range(len(c) - 2, i - 1, -1):
+            c[k] += time * c[k + 1]
+    return c
+
+
 def plans() -> None:
     """A plan, and a curve's value, made to compile them."""
     states, one = np.ones((1, 2, 3)), np.ones(2)
-    ground = Ground._make((0.0, 1.0, 0.0, 1.0, 9.81, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE))
+    feet, gravity = (0.0, 1.0, 0.0, 1.0), (9.81, 0.0)
+    ground = Ground._make((*feet, gravity, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE))
     best_pressure(states[0], states, one, ground, False, one.copy(), one.copy())
     polynomial(one, 1.0)
 

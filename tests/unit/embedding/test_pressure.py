@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from template_control.embedding.standing.curves import StandingOptions
+from template_control.embedding.standing.curves import BetweenFeet, StandingOptions
 from template_control.embedding.standing.pressure import Pieces, bounded, pressure
-from template_control.embedding.standing.supports import OverFeet
 from template_control.slip.dynamics.timed import polynomial
 from template_control.slip.parameters import SlipParameters
 
@@ -85,7 +84,7 @@ def samples(found):
 )
 def test_a_start_ends_where_the_rear_foot_has_no_load(toes, drift):
     """A stand that drifts past its feet by micrometres is no CoM that is about to pass them."""
-    feet = OverFeet(toes, P, OPTIONS)
+    feet = BetweenFeet(toes, P, OPTIONS)
     rest = feet.at_rest(feet.place(0.5))
     rest[0, :2] += 1e-5, drift
     liftoff = np.array([[toes[1] - 0.02, 0.7, 0.0], [0.96, 0.1, 0.0]])
@@ -102,7 +101,7 @@ def test_a_start_ends_where_the_rear_foot_has_no_load(toes, drift):
 
 
 def test_a_fast_walk_comes_to_rest_between_its_feet():
-    feet = OverFeet((0.0, 0.3), P, OPTIONS)
+    feet = BetweenFeet((0.0, 0.3), P, OPTIONS)
     found = feet.to_rest(np.array([[0.12, 1.1, 0.0], [0.96, 0.0, 0.0]]), True)
     assert feet.fits(found)
     _, x, y, p = samples(found)
@@ -114,7 +113,7 @@ def test_a_fast_walk_comes_to_rest_between_its_feet():
 
 def test_a_curve_within_the_feet_is_taken_where_there_is_one():
     """A quicker one, 0.1 mm beyond, would be made up for by a step."""
-    feet = OverFeet((0.0, 0.433), P, replace(OPTIONS, half_length=0.1265, slant=0.169))
+    feet = BetweenFeet((0.0, 0.433), P, replace(OPTIONS, half_length=0.1265, slant=0.169))
     found = feet.to_rest(np.array([[0.191, 0.471, -2.0], [0.958, -0.134, 2.0]]), True)
     assert feet.fits(found)
 
@@ -122,7 +121,7 @@ def test_a_curve_within_the_feet_is_taken_where_there_is_one():
 def test_soles_side_by_side_bear_more_midway_than_their_toes():
     pushed = np.array([[0.15, 0.85, 0.0], [OPTIONS.height, 0.0, 0.0]])
     for slant, holds in ((0.0, False), (0.2, True)):
-        feet = OverFeet((0.0, 0.3), P, replace(OPTIONS, half_length=0.3, slant=slant))
+        feet = BetweenFeet((0.0, 0.3), P, replace(OPTIONS, half_length=0.3, slant=slant))
         found = feet.to_rest(pushed)
         assert feet.fits(found) == holds
         share = 0.9 if slant else 0.8
@@ -132,14 +131,14 @@ def test_soles_side_by_side_bear_more_midway_than_their_toes():
 @pytest.mark.parametrize("height", [-0.5, 0.0, 0.05])
 def test_a_com_that_falls_cannot_be_held(height):
     """Below its feet it would diverge so fast that nothing of the plan is left but rounding."""
-    feet = OverFeet((0.0, 0.3), P, replace(OPTIONS, half_length=0.1))
+    feet = BetweenFeet((0.0, 0.3), P, replace(OPTIONS, half_length=0.1))
     found = feet.to_rest(np.array([[-1.0, 0.0, 0.0], [height, -6.0, -9.0]]))
     assert not feet.fits(found)
     assert np.isfinite([piece.coefficients for piece in found.pieces]).all()
 
 
 def test_a_com_that_is_about_to_pass_is_not_thrown_back():
-    feet = OverFeet((0.0, 0.0), P, OPTIONS)
+    feet = BetweenFeet((0.0, 0.0), P, OPTIONS)
     liftoff = np.array([[-0.05, 0.9, 0.0], [0.96, 0.1, 0.0]])
     late = np.array([[-0.1, 1.0, 0.0], [0.95, 0.2, 0.0]])
     found, _ = feet.to_liftoff(late, liftoff[None], False)
@@ -150,7 +149,7 @@ def test_a_start_leaves_time_to_shift_the_com_aside():
     liftoff = np.array([[0.08, 0.5, 0.0], [0.96, 0.1, 0.0]])
 
     def lasts(shift, speed=0.0, lands=False):
-        feet = OverFeet((0.0, 0.1), P, replace(OPTIONS, shift=shift))
+        feet = BetweenFeet((0.0, 0.1), P, replace(OPTIONS, shift=shift))
         start = np.array([[0.05, speed, 0.0], [OPTIONS.height, 0.0, 0.0]])
         found, _ = feet.to_liftoff(start, liftoff[None], lands)
         return sum(piece.duration for piece in found.pieces)
