@@ -7,10 +7,11 @@ import argparse
 import numpy as np
 
 from template_control.embedding.planners.ahead import AHEAD
+from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.planners.modified import ModifiedPlanner
-from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.embedding.standing.curves import STAND
+from template_control.embedding.tick import CONTROL
 from template_control.estimation.delay import DELAY
 from template_control.plant.bullet import READ
 from template_control.plant.ideal import IdealOptions
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace) -> int:
     from template_control.compiled import cache_folder
 
     other = (Part(scenarios, 6.0), Part(basins, 1.5))
-    ready((*WALK, *RECORD, *DELAY, *AHEAD, *STAND, *LATERAL, *READ, *other))
+    ready((*WALK, *CONTROL, *RECORD, *DELAY, *AHEAD, *STAND, *LATERAL, *READ, *other))
     ready((Part(floating_base, 8.0), Part(ideal_plant, 2.0)))  # which call the others
     plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
     return 0

@@ -24,12 +24,12 @@ from template_control.embedding.learners import Learners
 from template_control.embedding.modes import PLACED, check_legs, first_fired, modes, set_guards
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.planner import Cause, Planner, Planners
-from template_control.embedding.planners.walk_kernels import CONTROL
 from template_control.embedding.recovery import NEEDED, Recovery
 from template_control.embedding.state import SectionReport, Snapshot, StateObserver
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet, Swings
 from template_control.embedding.tick import (
+    CONTROL,
     DIVERGED,
     QUIET,
     SNAPSHOT,

@@ -79,8 +79,7 @@ def touchdown_angle_after(
 ) -> float:
     """Touchdown angle of a front leg that comes to l0 ``time`` [s] from now [rad].
 
-    The height then comes from its Taylor series to the second order. The robot is in single stance,
-    on a leg of a stiffness [N/m].
+    By the Taylor series of the height to the second order; a leg of a stiffness [N/m] stands.
     """
     x, y, _, dy = sensed.state.tolist()
     length = parameters.rest_length
@@ -166,10 +165,7 @@ def _cheapest(
         tried = prior.controls.copy()
         tried[stiff] = x
         there, outcome = ahead(tried)
-        if outcome is not Outcome.SECTION:
-            continue
-        cost = effort(x) + price(there)
-        if cost < least:
+        if outcome is Outcome.SECTION and (cost := effort(x) + price(there)) < least:
             least, u, end = cost, tried, there
     return u, end
 
@@ -184,21 +180,16 @@ def reachable_turn(scale: Scale, time_to_go: float) -> float:
 
 
 class Situation(NamedTuple):
-    """A robot within a stride, and what holds for it.
-
-    ``whole``: nothing of the stride has been used yet: it is in its first node, on springs.
-    ``to_go`` is the time until the touchdown is due [s], ``height_error`` that of the ground under
-    the foot that has landed over the other one's [m].
-    """
+    """A robot within a stride, and what holds for it."""
 
     node: Node
     sensed: TemplateState
     goal: StrideGoal
     decision: Decision
-    whole: bool = False
-    to_go: float = inf
+    whole: bool = False  # nothing of the stride has been used yet: in its first node, on springs
+    to_go: float = inf  # time until the touchdown is due [s]
     cause: Cause = Cause.DEVIATION
-    height_error: float = 0.0
+    height_error: float = 0.0  # of the ground under the foot that has landed over the other's [m]
 
 
 def reachable_angles(rollout: TemplateRollout, s: Situation) -> tuple[float, float]:
@@ -226,20 +217,16 @@ def choose_all_controls(
     that the swing foot can still reach [rad]. None where the template cannot have come from a
     section.
     """
-    planner = rollout.planners.of(s.goal)
-
-    def decide(so_far: Array) -> Decision | None:
-        z = rollout.backward_to_section(s.node, so_far, s.sensed)
-        if z is None:
-            return None
-        return decided(planner, Context(z, s.goal.target, angles, s.cause, s.decision))
-
-    decision = decide(s.decision.controls)
-    if decision is not None and decision.feasible:
-        return decision
+    planner, decision = rollout.planners.of(s.goal), None
     # The template would have flown or sunk with the legs so far; the robot's motors are weaker.
-    other = decide(planner.gait.controls)
-    return decision if other is None else other
+    for so_far in (s.decision.controls, planner.gait.controls):
+        z = rollout.backward_to_section(s.node, so_far, s.sensed)
+        if z is not None:
+            context = Context(z, s.goal.target, angles, s.cause, s.decision)
+            decision = decided(planner, context)
+            if decision.feasible:
+                break
+    return decision
 
 
 def choose_stiffnesses(rollout: TemplateRollout, s: Situation) -> Decision | None:
@@ -283,16 +270,12 @@ def _after_deviation(rollout: TemplateRollout, s: Situation) -> Decision | None:
 
 
 class Rule(NamedTuple):
-    """Row of the table of causes.
+    """Row of the table of causes."""
 
-    ``choose`` makes what can still be chosen, None where what was decided holds; ``recovers``: the
-    robot may break into another stride; ``angle_drop`` is how much lower the touchdown angle is
-    than decided [rad].
-    """
-
+    # Makes what can still be chosen, None where what was decided holds.
     choose: Callable[[TemplateRollout, Situation], Decision | None]
-    recovers: bool = False
-    angle_drop: float = 0.0
+    recovers: bool = False  # the robot may break into another stride
+    angle_drop: float = 0.0  # how much lower the touchdown angle is than decided [rad]
 
 
 RULES: Mapping[Cause, Rule] = {
@@ -381,14 +364,10 @@ def find_recovery(
 
 def _goes_on(rollout: TemplateRollout, s: Situation) -> bool:
     """True if the template completes the present stride from here, with these legs or others."""
-    ahead, u = rollout.ahead(s.node, s.sensed), s.decision.controls
-    legs = [u]
-    free = free_controls(rollout.automaton, s.node)
-    for share in _LEGS:
-        other = u.copy()
-        other[free] = share * rollout.ground.leg_stiffness
-        legs.append(other)
-    return any(ahead(other)[1] is Outcome.SECTION for other in legs)
+    ahead, free = rollout.ahead(s.node, s.sensed), free_controls(rollout.automaton, s.node)
+    legs = np.tile(s.decision.controls, (1 + len(_LEGS), 1))
+    legs[1:, free] = np.array(_LEGS)[:, None] * rollout.ground.leg_stiffness
+    return any(ahead(u)[1] is Outcome.SECTION for u in legs)
 
 
 def _break_into(rollout: TemplateRollout, s: Situation) -> Decision | None:

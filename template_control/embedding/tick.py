@@ -46,10 +46,18 @@ from template_control.embedding.swing import (
     swing_step,
     wait,
 )
+from template_control.robot.library import load_robot
 from template_control.robot.terms import LEGS, UP, onward
 from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.dynamics.model import ORDER
+from template_control.structured import keep
+from template_control.warm_up import Part
 from template_control.whole_body.problem import solve_free
+from template_control.whole_body.solver import WholeBodyQp
+from template_control.whole_body.stack import TaskStack
+from template_control.whole_body.task import References
 from template_control.whole_body.task_rows import write_rows
+from template_control.whole_body.tasks import PostureTask
 
 _F, _I = np.float64, np.int64
 
@@ -416,3 +424,23 @@ def look(tick: Any, data: Any, references: Any, out: Any) -> None:
         o.side_reference[foot] = want.side[foot, 0]
     o.sway[0] = r.com[_SIDE] - r.foot_position[f.roles[_REAR], _SIDE]
     o.sway[1] = side_speed(t, r)
+
+
+def whole_tick() -> None:
+    """A tick, called to compile it; only Pinocchio knows how its arrays lie."""
+    robot, references, tick = load_robot("five-link"), References(), np.zeros(1, TICK)
+    robot.update(robot.neutral(), np.zeros(robot.nv))
+    qp, tasks = WholeBodyQp(robot), TaskStack((PostureTask(),), robot.nv)
+    memory = references.data, qp.data
+    sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
+    stand(tick, robot.data, *memory)
+    plan_is_due(tick["path"][0], True, 0.0, 0.0, 0.0)
+    first_fired(tick[0])
+    curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
+    rows = tasks.program, tasks.table
+    kept = keep(((tick, robot.data, *memory, robot.arrays), (curve, None), rows, qp.room(1.0)))
+    act(kept, qp.answer_arrays(), 1e-3)
+
+
+CONTROL = (Part(whole_tick, 9.0),)
+"""Compiled functions of a tick."""

@@ -24,11 +24,10 @@ from template_control.embedding.planners.ahead import (
     check_feasibility,
 )
 from template_control.embedding.planners.default import default_planners, first_speed
-from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
+from template_control.embedding.planners.lqr import WALK, LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
-from template_control.embedding.planners.walk_kernels import WALK
 from template_control.embedding.robot_template import check_apex, robot_route, standing_options
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions

@@ -19,9 +19,10 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
-from template_control.embedding.planners.walk_kernels import WALK
+from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.robot_template import template_for
 from template_control.embedding.state import SectionReport
+from template_control.embedding.tick import CONTROL
 from template_control.errors import DivergedError, ParameterError
 from template_control.estimation.delay import DELAY
 from template_control.plant.plant import Plant, open_plant, plant_name
@@ -71,7 +72,7 @@ _LOG = logging.getLogger(__name__)
 QP_FAILURES = logging.getLogger(f"{__name__}.failures")
 """Logger of the warning that the QP has no solution in many ticks."""
 
-COMPILED = (*WALK, *RECORD, *DELAY)  # compiled functions of a walk and its record
+COMPILED = (*WALK, *CONTROL, *RECORD, *DELAY)  # compiled functions of a walk and its record
 
 _OTHER_TEMPLATE = 0.05
 """Share by which a template may differ from the robot's own: a choice of l0, not another robot."""

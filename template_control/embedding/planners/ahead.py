@@ -12,7 +12,6 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Range
 from template_control.embedding.planners.gait_table import (
     COLUMNS,
-    CONTROLS,
     SLOTS,
     STATE,
     STATE_TOLERANCE,
@@ -26,14 +25,18 @@ from template_control.embedding.planners.gait_table import (
     row_at,
 )
 from template_control.embedding.planners.look_ahead import (
-    Plan,
     PlanProblem,
     PlanTarget,
     look_ahead,
+    new_plan,
 )
-from template_control.embedding.planners.lqr import KNEE_MOMENT, KNEE_STRAIGHT, LqrPlanner
+from template_control.embedding.planners.lqr import (
+    KNEE_MOMENT,
+    KNEE_STRAIGHT,
+    WALK,
+    LqrPlanner,
+)
 from template_control.embedding.planners.planner import ANY_ANGLE, Context, Decision, Planner
-from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
@@ -137,12 +140,7 @@ class AheadPlanner(Planner):
         self.table: GaitTable = gait_table(parameters)
         self._problem = plan_problem(parameters, self.table, o.ease, o.earliest)
         self._work = new_workspace()
-        self._plan = Plan(
-            np.empty((o.steps + 1, PADDED)),
-            np.empty((o.steps, CONTROLS)),
-            np.empty((o.steps, 3)),
-            np.empty(WIDTH),
-        )
+        self._plan = new_plan(o.steps)
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._lead_to(self._first)
         self._lqr = LqrPlanner(self.gait)
@@ -197,11 +195,17 @@ class AheadPlanner(Planner):
         for speed in aims:
             cost, excess = self._look(z, speed, angles)
             if excess <= self.options.cheap and cost <= (self.options.dearest or np.inf):
-                break
+                return self._decision(speed, wanted, True)
             cheapest = min(cheapest, (cost, speed))
-        else:
-            return self._otherwise(z, wanted, cheapest, angles)
-        return self._decision(speed, wanted, True)
+        # No plan is cheap: the search's step, or the cheapest plan's if that is better.
+        speed = min(max(self._spacing * round(float(z[0]) / self._spacing), low), high)
+        decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
+        cost, speed = cheapest
+        if decision.lasting or not np.isfinite(cost):
+            self._lead_to(float(self._lqr.gait.vlo[0]))
+            return replace(decision, nominal=False, accepted=self._speed)
+        self._look(z, speed, angles)
+        return self._decision(speed, wanted, False)
 
     def _look(self, z: Array, speed: float, angles: tuple[float, float]) -> tuple[float, float]:
         aim = PlanTarget(speed, self.offset, (float(angles[0]), float(angles[1])))
@@ -216,21 +220,6 @@ class AheadPlanner(Planner):
         u[SLOTS[1:]] *= self._plan.row[STIFFNESS]
         accepted = None if speed == wanted else speed
         return Decision(u, self._plan.states[1].copy(), True, True, nominal, accepted)
-
-    def _otherwise(
-        self, z: Array, wanted: float, cheapest: tuple[float, float], angles: tuple[float, float]
-    ) -> Decision:
-        """A step where no plan is cheap: the search's, or the cheapest plan's if that is better."""
-        spacing = self._spacing
-        low, high = self.speeds
-        speed = min(max(spacing * round(float(z[0]) / spacing), low), high)
-        decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
-        cost, near = cheapest
-        if decision.lasting or not np.isfinite(cost):
-            self._lead_to(float(self._lqr.gait.vlo[0]))
-            return replace(decision, nominal=False, accepted=self._speed)
-        self._look(z, near, angles)
-        return self._decision(near, wanted, False)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
@@ -262,10 +251,8 @@ def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
     row = np.ones((1, WIDTH))
     known = plan_problem(SlipParameters(), GaitTable(np.ones(1), row))._replace(rounds=1)
-    plan = Plan(np.empty((2, PADDED)), np.empty((1, CONTROLS)), np.empty((1, 3)), np.empty(WIDTH))
     aim = PlanTarget(1.0, np.zeros(PADDED), ANY_ANGLE)
-    work = new_workspace()
-    look_ahead(known, work, np.ones(PADDED), aim, plan)
+    look_ahead(known, new_workspace(), np.ones(PADDED), aim, new_plan(1))
 
 
 AHEAD = (Part(plan_ahead, 10.0),)

@@ -28,6 +28,7 @@ from template_control.embedding.planners.gait_table import (
     SLOTS,
     STATE,
     STIFFNESS,
+    WIDTH,
     GaitTable,
     gait_row,
 )
@@ -51,74 +52,60 @@ BOUNDS = np.array(
 )
 """(2, 4) least and greatest alpha relative to the gait's [rad], and stiffnesses over k."""
 _DONE = 0.02  # of the cost: a Gauss-Newton step that lowers it by less is the last
-_HALVINGS = 4  # of a Gauss-Newton step that does not lower the cost
+_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0)  # of a Gauss-Newton step, until one lowers the cost
 _LESS = 0.5  # of the LQR's feedback, where the template cannot do it
 
 
 class PlanProblem(NamedTuple):
-    """Model and costs of every plan.
+    """Model and costs of every plan."""
 
-    Attributes:
-        kernel: the step.
-        table: gaits by speed.
-        tolerance: (3,) differences of the states that cost 1.
-        ease: control tolerances over those of the gaits' table.
-        rise: |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s].
-        knee_reach: length of the leg at which the knee is straight [m].
-        knee_moment: moment of the leg force about the knee that costs nothing [N m].
-        earliest: the foot lands so long after VLO at the soonest [s].
-        rounds: Gauss-Newton steps at most.
-        columns: (7,) of the map's derivatives, states and controls.
-    """
-
-    kernel: Kernel
+    kernel: Kernel  # the step
     table: GaitTable
-    tolerance: Array
-    ease: float
-    rise: tuple[float, float]
-    knee_reach: float
-    knee_moment: float
-    earliest: float
-    rounds: int
-    columns: IntArray
+    tolerance: Array  # (3,) differences of the states that cost 1
+    ease: float  # control tolerances over those of the gaits' table
+    rise: tuple[float, float]  # |dy/dt| that costs nothing, and what is beyond and costs 1 [m/s]
+    knee_reach: float  # length of the leg at which the knee is straight [m]
+    knee_moment: float  # of the leg force about the knee that costs nothing [N m]
+    earliest: float  # the foot lands so long after VLO at the soonest [s]
+    rounds: int  # Gauss-Newton steps at most
+    columns: IntArray  # (7,) of the map's derivatives, states and controls
 
 
 class PlanTarget(NamedTuple):
-    """Speed, offset and angles that a plan is made for.
+    """Speed, offset and angles that a plan is made for."""
 
-    Attributes:
-        speed: dx/dt at VLO of the aimed gait [m/s].
-        offset: (3,) what the robot adds to each step of the template.
-        angles: least and greatest touchdown angle of the first step [rad].
-    """
-
-    speed: float
-    offset: Array
-    angles: tuple[float, float]
-
-
-class Plan(NamedTuple):
-    """Plan of N steps.
-
-    Attributes:
-        states: (N + 1, 3) at VLO, the present one first.
-        controls: (N, 4) alpha and shares of the aimed gait's k.
-        lengths: (N, 3) of the rear and the front leg at the virtual bottom, and of the rear leg at
-            touchdown [m].
-        row: of the aimed gait, see :mod:`~.gait_table`.
-    """
-
-    states: Array
-    controls: Array
-    lengths: Array
-    row: Array
+    speed: float  # dx/dt at VLO of the aimed gait [m/s]
+    offset: Array  # (3,) what the robot adds to each step of the template
+    angles: tuple[float, float]  # least and greatest touchdown angle of the first step [rad]
 
 
 STATES = 3
 """Of a section at VLO."""
+_KNEES = 3
+
+
+class Plan(NamedTuple):
+    """Plan of N steps."""
+
+    states: Array  # (N + 1, 3) at VLO, the present one first
+    controls: Array  # (N, 4) alpha and shares of the aimed gait's k
+    # (N, 3) of the rear and the front leg at the virtual bottom, and of the rear leg at touchdown
+    # [m]
+    lengths: Array
+    row: Array  # of the aimed gait, see gait_table
+    target: Array  # (7,) z*, u*: that gait, as the robot settles on it
+    factor: Array  # (3, 3) L with P = L L'
+
+
+def new_plan(steps: int) -> Plan:
+    """Room for a plan."""
+    states, free = np.empty((steps + 1, STATES)), np.empty((steps, CONTROLS))
+    lengths, row = np.empty((steps, _KNEES)), np.empty(WIDTH)
+    target, factor = np.empty(STATES + CONTROLS), np.empty((STATES, STATES))
+    return Plan(states, free, lengths, row, target, factor)
+
 
 _LIMITS = STATES + CONTROLS
-_KNEES = 3
 PER_STEP = STATES + CONTROLS + 1 + _KNEES
 """Residuals of a step: states, controls, what rises beyond, what the knees bear beyond: of the rear
 and of the front leg at the virtual bottom, and of the rear leg just after touchdown."""
@@ -126,9 +113,9 @@ _KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
 
 
 @compiled
-def aimed(p: PlanProblem, aim: PlanTarget, plan: Plan, target: Array, factor: Array) -> None:
-    """Write the aimed gait, as the robot settles on it: z*, u* (7,), and L (3, 3), P = L L'."""
-    row = plan.row
+def _aimed(p: PlanProblem, aim: PlanTarget, plan: Plan) -> None:
+    """Write the gait that a plan aims at, and what belongs to it."""
+    row, target, factor = plan.row, plan.target, plan.factor
     gait_row(p.table, aim.speed, row)
     for i in range(STATES + CONTROLS):
         target[i] = row[STATE + i]
@@ -151,11 +138,9 @@ def slots_of(plan: Plan, i: int, u: Array) -> None:
 
 
 @compiled
-def residuals(p: PlanProblem, plan: Plan, target: Array, factor: Array, out: Array) -> float:
-    """Write the errors of a plan, in tolerances, into ``out`` (11 N,); return the cost.
-
-    ``target`` and ``factor`` are from :func:`aimed`.
-    """
+def residuals(p: PlanProblem, plan: Plan, out: Array) -> float:
+    """Write the errors of a plan, in tolerances, into ``out`` (11 N,); return the cost."""
+    target, factor = plan.target, plan.factor
     steps, cost = plan.controls.shape[0], 0.0
     for i in range(steps):
         row = PER_STEP * i
@@ -233,9 +218,9 @@ def _chain(
 
 
 @compiled
-def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, factor: Array, rows: Array) -> None:
+def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, rows: Array) -> None:
     """Write the derivatives of :func:`residuals` by all controls into ``rows`` (11 N, 4 N)."""
-    steps = plan.controls.shape[0]
+    steps, factor = plan.controls.shape[0], plan.factor
     size = CONTROLS * steps
     u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
     by_control = np.empty((RESULTS, CONTROLS))
@@ -326,14 +311,13 @@ def _bounds(
 
 @compiled
 def _guess(
-    p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, target: Array, feedback: float
+    p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, feedback: float
 ) -> bool:
     """A plan to begin with: ``feedback`` of the LQR's on top of the aimed gait's controls.
 
-    Returns:
-        False where the template does not complete a step.
+    False where the template does not complete a step.
     """
-    size = CONTROLS * plan.controls.shape[0]
+    target, size = plan.target, CONTROLS * plan.controls.shape[0]
     lower, upper = np.empty(size), np.empty(size)
     for i in range(plan.controls.shape[0]):
         _bounds(p, aim, plan, i, lower, upper)
@@ -360,48 +344,39 @@ def look_ahead(
     """
     steps = plan.controls.shape[0]
     size = CONTROLS * steps
-    target, factor = np.empty(STATES + CONTROLS), np.empty((STATES, STATES))
-    aimed(p, aim, plan, target, factor)
+    _aimed(p, aim, plan)
     for j in range(STATES):
         plan.states[0, j] = z[j]
     feedback = 1.0
-    while not _guess(p, work, aim, plan, target, feedback):
+    while not _guess(p, work, aim, plan, feedback):
         if feedback == 0.0:
             return np.inf, np.inf
         feedback = max(feedback - _LESS, 0.0)
     lower, upper = np.empty(size), np.empty(size)
     rows, residual = np.empty((PER_STEP * steps, size)), np.empty(PER_STEP * steps)
     start, x = np.empty(size), np.empty(size)
-    cost = residuals(p, plan, target, factor, residual)
+    free = plan.controls.reshape(size)
+    cost = residuals(p, plan, residual)
     for _ in range(p.rounds):
-        slopes(p, work, plan, factor, rows)
+        slopes(p, work, plan, rows)
         for i in range(steps):
             _bounds(p, aim, plan, i, lower, upper)
         for i in range(size):
-            start[i] = plan.controls[i // CONTROLS, i % CONTROLS]
+            start[i] = free[i]
             x[i] = min(max(start[i], lower[i]), upper[i])
         for r in range(residual.shape[0]):
             for i in range(size):
                 residual[r] += rows[r, i] * (x[i] - start[i])
         there = bounded_step(rows, residual, x, lower, upper, 0.0)
-        share, lowered = 1.0, np.inf
-        for _ in range(_HALVINGS):
+        lowered = np.inf
+        for share in _SHARES:
             for i in range(size):
-                value = start[i] + share * (there[i] - start[i])
-                plan.controls[i // CONTROLS, i % CONTROLS] = value
+                free[i] = start[i] + share * (there[i] - start[i])
             if _roll(p, work, aim, plan):
-                lowered = residuals(p, plan, target, factor, residual)
+                lowered = residuals(p, plan, residual)
                 if lowered < cost:
                     break
-            share *= 0.5
-        if not lowered < cost:
-            for i in range(size):
-                plan.controls[i // CONTROLS, i % CONTROLS] = start[i]
-            _roll(p, work, aim, plan)
-            residuals(p, plan, target, factor, residual)
-            break
-        small = cost - lowered < _DONE * max(lowered, 1.0)
-        cost = lowered
-        if small:
+        saved, cost = cost - lowered, min(cost, lowered)
+        if saved < _DONE * max(cost, 1.0):
             break
     return cost, excess(residual)

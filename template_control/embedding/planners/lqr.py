@@ -28,14 +28,15 @@ from template_control.embedding.planners.planner import (
 from template_control.embedding.planners.step_search import (
     EFFORT,
     FALL_PRICE,
+    SEARCH,
     KneeLoadPenalty,
     Law,
     choose,
 )
-from template_control.embedding.planners.walk_kernels import WALK
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search
+from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
 from template_control.slip.dynamics.model import stride_kernel
@@ -116,6 +117,9 @@ _SECOND_PUSH_OFF_STEPS = (
     (0.045, 0.75, 0.75, 1.25),
 )
 _REST_ROUNDS = 6  # of Gauss and Newton's method; most choices take three
+
+WALK = (*STRIDES, *SEARCH)
+"""Compiled functions of the planner."""
 
 
 @dataclass(frozen=True)
@@ -200,7 +204,7 @@ class LqrPlanner(Planner):
         share = _STRAIGHT / bend if self._pushes else 0.0
         self._change_weight = float(CONTROL_WEIGHT * (1.0 + share**2))
         self._settling = settling_map(self.a, self.b, np.array(o.tolerance), self._change_weight)
-        self._aim_anew()
+        self._aim(self._settling @ self.offset)
 
     def __repr__(self) -> str:
         return f"<LqrPlanner on {self.gait!r}>"
@@ -219,7 +223,7 @@ class LqrPlanner(Planner):
         loses up to 0.04 m/s. What it adds to y and dy/dt is much the same.
         """
         self.offset = self.offset * _KEPT
-        self._aim_anew()
+        self._aim(self._settling @ self.offset)
 
     def on_slope(self, slope: float) -> SlipParameters:
         """See :meth:`~.planner.Planner.on_slope`; without a gait there the ground is level."""
@@ -228,18 +232,17 @@ class LqrPlanner(Planner):
             self._settle_on(self.gait)
         return self._here.parameters
 
-    def _aim_anew(self) -> None:
-        self._shift = self._settling @ self.offset
-        self._law = self._aim()
+    def _aim(self, shift: Array) -> None:
+        """Make the linear law about the fixed point the robot has with the present offset.
 
-    def _aim(self) -> Law:
-        """The linear law about the fixed point the robot has with the present offset."""
+        Its ``shift`` (3 + c,) so far is where it is looked for.
+        """
         p, o, slots = self._here.parameters, self.options, self._slots
-        shift = self._shift = self._settled()
+        shift = self._shift = self._settled(shift)
         nominal, others = self._here.controls[slots] / self._units, len(slots) - 1
         steps = _SECOND_PUSH_OFF_STEPS if self._pushes else _SECOND_STEPS
         relative_to = (nominal[0], *[0.0] * others)
-        return Law(
+        self._law = Law(
             target=self._here.vlo + shift[:3],
             control=nominal + shift[3:],
             gain=self._gain,
@@ -262,7 +265,7 @@ class LqrPlanner(Planner):
             kernel=stride_kernel(p, self._here.stride),
         )
 
-    def _settled(self) -> Array:
+    def _settled(self, shift: Array) -> Array:
         """(3 + c,) shift of the fixed point by the present offset.
 
         With push-off the map counts as it is about the shift so far, not as it is about the gait:
@@ -273,7 +276,7 @@ class LqrPlanner(Planner):
         if not self._pushes:
             return linear
         slots, units, tolerance = self._slots, self._units, np.array(self.options.tolerance)
-        shift, step = self._shift, ReturnMap(self._here.parameters, self._here.stride)
+        step = ReturnMap(self._here.parameters, self._here.stride)
         for _ in range(_ROUNDS):
             z, u = self._here.vlo + shift[:3], self._here.controls.copy()
             u[slots] += shift[3:] * units
@@ -352,7 +355,7 @@ class LqrPlanner(Planner):
         unit, surprise = self._scale.state, z - decision.predicted
         limits = _SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
         self.offset = learnt(self.offset, surprise, self.options.offset_gain, limits)
-        self._law = self._aim()
+        self._aim(self._shift)
 
 
 def lqr(a: Array, b: Array, q: Array, r: Array) -> tuple[Array, Array]:

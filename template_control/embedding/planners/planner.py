@@ -139,22 +139,13 @@ class Planner(Protocol):
 
     @abstractmethod
     def decide(self, context: Context) -> Decision:
-        """Controls for a whole stride; it may be asked several times a stride.
-
-        Args:
-            context: section state, target, and what is free.
-        """
+        """Controls for a whole stride; it may be asked several times a stride."""
 
     def decide_rest(self, context: RestContext) -> Decision | None:
         """Controls for the rest of a stride that has begun.
 
-        Args:
-            context: where the rest leads, and what is free.
-
-        Returns:
-            None by a planner of whole strides: as a foot lands :meth:`decide` is asked, for the
-            section state from which the template would have come there; else what was decided
-            holds.
+        None by a planner of whole strides: as a foot lands :meth:`decide` is asked, for the section
+        state from which the template would have come there; else what was decided holds.
         """
         return None
 

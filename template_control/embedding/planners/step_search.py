@@ -14,10 +14,12 @@ import numpy as np
 
 from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome
-from template_control.slip.dynamics.kernel import Scratch
-from template_control.slip.dynamics.model import Kernel
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
+from template_control.slip.dynamics.kernel import Scratch, new_scratch
+from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
+from template_control.slip.parameters import SlipParameters
+from template_control.warm_up import Part
 
 _FAST = np.int64(MapKind.IMPROVED)  # Numba would compile once more for a literal int
 _FLIES = int(Outcome.UNWANTED_FLIGHT)
@@ -43,58 +45,36 @@ _NARROWING = 0.4  # half-widths of a finer grid over those of the one before, at
 
 
 class KneeLoadPenalty(NamedTuple):
-    """Price of a step whose leg forces are more than a knee carries.
+    """Price of a step whose leg forces are more than a knee carries."""
 
-    Attributes:
-        reach: length of the leg at which the knee is straight [m].
-        most: moment of the leg force about the knee from which on a step costs more [N m].
-        price: of a moment that is twice as much.
-    """
-
-    reach: float
-    most: float
-    price: float
+    reach: float  # length of the leg at which the knee is straight [m]
+    most: float  # moment of the leg force about the knee from which on a step costs more [N m]
+    price: float  # of a moment that is twice as much
 
 
 class Law(NamedTuple):
     """A bounded linear law u = u_s - K (z - z_s) and what its steps cost.
 
     There are c controls: 3 in the paper's walking step, 4 in one with push-off.
-
-    Attributes:
-        target: (3,) z_s, dx/dt, y, dy/dt.
-        control: (c,) u_s: alpha [rad], kappa_1/k0, kappa_2/k0 and, with push-off, kappa_p/k0.
-        gain: (c, 3) K.
-        cost: (3, 3) cost-to-go about ``target``.
-        offset: (3,) what the robot adds to the template's next VLO state.
-        lower, upper: (c,) bounds of u.
-        slots: (c,) places of u in a stride's controls.
-        second_steps: (n, c) other controls than u_s - K (z - z_s) for the second step.
-        trusted_price: a cost below which no other second step is tried, nor any other first one.
-        effort: (c,) of (u - u_s)^2 in the first step, added to both.
-        highest: a CoM that flies higher than this [m] has left the ground.
-        earliest: alpha also stays below asin(y / l0) this long after VLO [s].
-        stiffness: k0 [N/m].
-        knee_load: what a step costs that loads the knees more than they carry.
-        kernel: the template's walking step.
     """
 
-    target: Array
-    control: Array
-    gain: Array
-    cost: Array
-    offset: Array
-    lower: Array
+    target: Array  # (3,) z_s, dx/dt, y, dy/dt
+    control: Array  # (c,) u_s: alpha [rad], kappa_1/k0, kappa_2/k0 and, with push-off, kappa_p/k0
+    gain: Array  # (c, 3) K
+    cost: Array  # (3, 3) cost-to-go about the target
+    offset: Array  # (3,) what the robot adds to the template's next VLO state
+    lower: Array  # (c,) bounds of u
     upper: Array
-    slots: IntArray
-    second_steps: Array
+    slots: IntArray  # (c,) places of u in a stride's controls
+    second_steps: Array  # (n, c) other controls than the law's for the second step
+    # A cost below which no other second step is tried, nor any other first one.
     trusted_price: float
-    effort: Array
-    highest: float
-    earliest: float
-    stiffness: float
+    effort: Array  # (c,) price of (u - u_s)^2 in the first step, added to that of both
+    highest: float  # a CoM that flies higher than this [m] has left the ground
+    earliest: float  # the foot lands so long after VLO at the soonest [s]
+    stiffness: float  # k0 [N/m]
     knee_load: KneeLoadPenalty
-    kernel: Kernel
+    kernel: Kernel  # the template's walking step
 
 
 @compiled
@@ -319,3 +299,31 @@ def choose(law: Law, s: Scratch, z: Array, u: Array, first: Array) -> tuple[floa
     copy(other, u)
     copy(end, first)
     return found, False
+
+
+def chosen_step() -> None:
+    """The look-ahead, called to compile it: the law, what a step is worth, and the search."""
+    three, template = np.ones(3), SlipParameters()
+    law = Law(
+        target=three,
+        control=three,
+        gain=np.zeros((3, 3)),
+        cost=np.eye(3),
+        offset=three,
+        lower=three,
+        upper=three,
+        slots=np.arange(3),
+        second_steps=np.ones((1, 3)),
+        trusted_price=0.0,
+        effort=three,
+        highest=1.0,
+        earliest=0.0,
+        stiffness=template.leg_stiffness,
+        knee_load=KneeLoadPenalty(1.1, 350.0, 1.0),
+        kernel=stride_kernel(template, StrideKind.WALK),
+    )
+    choose(law, new_scratch(), three, np.ones(3), np.empty(3))
+
+
+SEARCH = (Part(chosen_step, 6.3),)
+"""Compiled functions of the look-ahead, in addition to those of strides."""

@@ -7,12 +7,12 @@ target, the next gait's planner makes good.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.embedding.planners.planner import (
@@ -138,36 +138,32 @@ class TransitionPlanner(Planner):
     def decide_rest(self, context: RestContext) -> Decision:
         """See :meth:`~.planner.Planner.decide_rest`."""
         if context.cause is Cause.RECOVERY:
-            return self._break_into(context)
-        controls = context.decision.controls
-        stiff = [slot for slot in context.free if slot != Slot.TOUCHDOWN_ANGLE]
-        base = controls[stiff]
-        lower, upper = (share * base for share in _AGAIN_BOUNDS)
-        table = np.array([base, _AGAIN * base, lower, upper])
-        prior = Prior(controls, stiff, table, _SEARCH)
+            prior = self._broken_into(context)
+        else:
+            controls = context.decision.controls
+            slots = [slot for slot in context.free if slot != Slot.TOUCHDOWN_ANGLE]
+            base, (low, high) = controls[slots], _AGAIN_BOUNDS
+            table = np.array([base, _AGAIN * base, low * base, high * base])
+            prior = Prior(controls, slots, table, _SEARCH)
         return self._solved(context.ahead, context.target, prior)
 
-    def _break_into(self, context: RestContext) -> Decision:
+    def _broken_into(self, context: RestContext) -> Prior:
         """From another stride. u_0 is the next gait's; what is not free here stays."""
-        controls, target, turn = context.decision.controls, context.target, context.turn
-        o, gait = self.options, self._after(float(target[0]))
-        own = [slot for slot in o.slots if slot != Slot.TOUCHDOWN_ANGLE]
+        gait, u = self._after(float(context.target[0])), context.decision.controls.copy()
+        own = [slot for slot in self.options.slots if slot != Slot.TOUCHDOWN_ANGLE]
         chosen = {Slot.TOUCHDOWN_ANGLE: Slot.TOUCHDOWN_ANGLE} | dict(zip(own, _LEGS, strict=False))
         slots = [slot for slot in context.free if slot in chosen]
-        turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
-        base = gait.controls[[chosen[Slot(slot)] for slot in slots]]
-        now, wanted = float(controls[Slot.TOUCHDOWN_ANGLE]), gait.controls[Slot.TOUCHDOWN_ANGLE]
-        flattest = max(now - turn, min(now, wanted + _BROKEN_ANGLES[0]))
-        steepest = min(now + turn, max(now, wanted + _BROKEN_ANGLES[1]))
+        base, turns = gait.controls[[chosen[Slot(slot)] for slot in slots]], _turns(slots)
+        now, wanted = float(u[Slot.TOUCHDOWN_ANGLE]), gait.controls[Slot.TOUCHDOWN_ANGLE]
+        flattest = max(now - context.turn, min(now, wanted + _BROKEN_ANGLES[0]))
+        steepest = min(now + context.turn, max(now, wanted + _BROKEN_ANGLES[1]))
         softest, stiffest = _BROKEN_BOUNDS
         lower = np.where(turns, flattest, softest * base)
         upper = np.where(turns, steepest, stiffest * base)
         base = np.clip(base, lower, upper)
         change = np.where(turns, _BROKEN_TURN, _AGAIN * base)
-        u = controls.copy()
         u[own] = gait.controls[[chosen[slot] for slot in own]]
-        prior = Prior(u, slots, np.array([base, change, lower, upper]), _SEARCH)
-        return self._solved(context.ahead, target, prior)
+        return Prior(u, slots, np.array([base, change, lower, upper]), _SEARCH)
 
     def _solved(self, stride: StrideEnd, wanted: Array, prior: Prior) -> Decision:
         size = len(wanted)
@@ -177,10 +173,8 @@ class TransitionPlanner(Planner):
 
     def _prior(self, z: Array, angles: tuple[float, float]) -> Prior:
         o, p = self.options, self._before.gait.parameters
-        unit = p.mass * p.gravity / p.rest_length
-        slots = [int(slot) for slot in o.slots]
-        turns = np.array([slot == Slot.TOUCHDOWN_ANGLE for slot in slots])
-        base = np.array(o.base) * np.where(turns, 1.0, unit)
+        slots, turns = [int(slot) for slot in o.slots], _turns(o.slots)
+        base = np.array(o.base) * np.where(turns, 1.0, p.mass * p.gravity / p.rest_length)
         low, high = np.array(o.bounds).T
         lower = np.where(turns, base + low, base * low)
         upper = np.where(turns, base + high, base * high)
@@ -194,3 +188,8 @@ class TransitionPlanner(Planner):
         change = np.array(o.change) * np.where(turns, 1.0, base)
         table = np.array([np.clip(base, lower, upper), change, lower, upper])
         return Prior(controls, slots, table, _SEARCH)
+
+
+def _turns(slots: Sequence[int]) -> BoolArray:
+    """(f,) which of the controls is the touchdown angle."""
+    return np.array(slots) == Slot.TOUCHDOWN_ANGLE

@@ -169,15 +169,11 @@ STAND = (Part(curves, 0.5),)
 
 
 class Found(NamedTuple):
-    """The best curve found, its pieces in order.
+    """The best curve found."""
 
-    ``excess`` is by how far the centre of pressure leaves the feet, or a leg its reach; ``cost`` is
-    excess beyond the slack, and time [m].
-    """
-
-    pieces: tuple[Quintic, ...]
-    excess: float
-    cost: float
+    pieces: tuple[Quintic, ...]  # in order
+    excess: float  # by how far the centre of pressure leaves the feet, or a leg its reach [m]
+    cost: float  # excess beyond the slack, and time [m]
 
 
 _PEAK = 10.0 / np.sqrt(3.0)  # acceleration of a quintic from rest to rest, over distance / time^2
@@ -201,8 +197,8 @@ _SHARE = 0.8
 _STILL = 0.01  # over sqrt(g l0): a CoM that is faster does not begin at rest
 # Near its end a curve that is planned anew had better miss it by millimetres than swing back once
 # more.
-_SWING_PACE = 0.01  # as _PACE
-_SWING_DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s], for the reference template
+_PRESSURE_PACE = 0.01  # as _PACE
+_PRESSURE_DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s], for the reference template
 
 
 @dataclass(frozen=True)
@@ -286,7 +282,7 @@ class BetweenFeet:
         """
         wanted = self.place(PLACE)
         if self.options.half_length:
-            return self._pressed(start, self.at_rest(wanted)[None], lands)[0]
+            return self._by_pressure(start, self.at_rest(wanted)[None], lands)[0]
         margin = min(self.margin, 0.5 * abs(self.spacing))
         low, high = self.ground.low + margin, self.ground.high - margin
         places = np.append(np.linspace(low, high, _REST_PLACES), wanted)
@@ -304,7 +300,7 @@ class BetweenFeet:
         may first move back, and rest there. The rear foot has no load left at the end.
         """
         if self.options.half_length:
-            return self._pressed_to_liftoff(start, ends, lands)
+            return self._by_pressure_to_liftoff(start, ends, lands)
         found, number = self._best(self.loaded(start) if lands else start, ends)
         if lands or self.fits(found):
             return found, number
@@ -340,7 +336,7 @@ class BetweenFeet:
         curve = Quintic.between(self.at_rest(start), self.at_rest(end), time)
         return Found((curve,), 0.0, self.ground.pace * time)
 
-    def _pressed_to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
+    def _by_pressure_to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
         (x, speed, _), (height, *_) = start.tolist()
         rate = float(np.sqrt(self.parameters.gravity / max(height, self.margin)))
         moves = speed > _STILL * self.parameters.speed_unit
@@ -348,9 +344,9 @@ class BetweenFeet:
         passes = moves and x + speed / rate > self.toes[1]
         longest = _PASSING * max(self.toes[1] - x, 0.0) / speed if passes else np.inf
         shortest = 0.0 if lands or moves else self.options.shift
-        return self._pressed(start, ends, lands, UNLOADING, (shortest, longest))
+        return self._by_pressure(start, ends, lands, UNLOADING, (shortest, longest))
 
-    def _pressed(
+    def _by_pressure(
         self,
         start: Array,
         ends: Array,
@@ -371,12 +367,12 @@ class BetweenFeet:
             low=min(middle - half, points.low),
             high=max(middle + half, points.high),
             gravity=(self.parameters.gravity, 0.0),
-            pace=_SWING_PACE * unit.speed,
+            pace=_PRESSURE_PACE * unit.speed,
             unloading=unloading * unit.time,
         )
         p, rates = np.empty(_PIECES), np.empty(_PIECES)
         shortest, longest = within
-        durations = _SWING_DURATIONS * unit.time
+        durations = _PRESSURE_DURATIONS * unit.time
         durations = durations[durations <= max(longest, durations[0])]
         durations = np.unique(np.maximum(durations, shortest))
         cost, excess, end, i = best_pressure(start, ends, durations, ground, lands, p, rates)

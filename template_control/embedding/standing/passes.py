@@ -60,65 +60,39 @@ _MIRROR = np.array([[-1.0, 1.0, -1.0], [1.0, -1.0, 1.0]])
 
 
 class SingleSupportPass(NamedTuple):
-    """A pass over a leg whose foot is at x = 0.
+    """A pass over a leg whose foot is at x = 0."""
 
-    ``vlo`` (3,) is dx/dt, y, dy/dt there [m/s, m, m/s], ``stiffness`` the leg's [N/m]; ``way``
-    (n, 2, 3) are states of the CoM on the way to VLO, the last of them first.
-    """
-
-    vlo: Array
-    stiffness: float
-    way: Array
+    vlo: Array  # (3,) dx/dt, y, dy/dt [m/s, m, m/s]
+    stiffness: float  # of the leg [N/m]
+    way: Array  # (n, 2, 3) states of the CoM on the way to VLO, the last of them first
 
 
 class Touchdown(NamedTuple):
-    """Touchdown of a walking step.
+    """Touchdown of a walking step."""
 
-    Attributes:
-        angle: its touchdown angle [rad].
-        stiffness: of the leg before it [N/m].
-        state: (2, 3) of the CoM.
-        toes: x of the rear and the front foot [m].
-        late: by how much it comes later than the foot could [s].
-    """
-
-    angle: float
-    stiffness: float
-    state: Array
-    toes: tuple[float, float]
-    late: float
+    angle: float  # of the leg that lands [rad]
+    stiffness: float  # of the leg before it [N/m]
+    state: Array  # (2, 3) of the CoM
+    toes: tuple[float, float]  # x of the rear and the front foot [m]
+    late: float  # by how much it comes later than the foot could [s]
 
 
 class StepLanding(NamedTuple):
-    """Landing of a step from a stand.
+    """Landing of a step from a stand."""
 
-    Attributes:
-        angle: touchdown angle [rad].
-        time: from where it was looked for [s].
-        toe: x of the foot [m].
-        price: of coming to rest after it [m].
-    """
-
-    angle: float
-    time: float
-    toe: float
-    price: float
+    angle: float  # of the leg that lands [rad]
+    time: float  # from where it was looked for [s]
+    toe: float  # x of the foot [m]
+    price: float  # of coming to rest after it [m]
 
 
 class StepPass(NamedTuple):
-    """The way over a foot at x = 0, and the landing after it.
+    """The way over a foot at x = 0, and the landing after it."""
 
-    Attributes:
-        stiffness: of the leg [N/m].
-        times: (n,) at which the other foot may lift off, 0 at VLO [s].
-        states: (n, 2, 3) of the CoM then.
-        landing: the best, from VLO on.
-    """
-
-    stiffness: float
-    times: Array
-    states: Array
-    landing: StepLanding
+    stiffness: float  # of the leg [N/m]
+    times: Array  # (n,) at which the other foot may lift off, 0 at VLO [s]
+    states: Array  # (n, 2, 3) of the CoM then
+    landing: StepLanding  # the best, from VLO on
 
 
 class PassTable:

@@ -211,16 +211,13 @@ class CurvePlanner(Planner):
 
 
 class Away(NamedTuple):
-    """A curve to a liftoff (2, 3), and the landing after it; ``price`` is of both [m].
-
-    The leg that stays between them has a stiffness [N/m].
-    """
+    """A curve to a liftoff, and the landing after it."""
 
     found: Found
-    liftoff: Array
-    stiffness: float
+    liftoff: Array  # (2, 3) state of the CoM
+    stiffness: float  # of the leg that stays [N/m]
     landing: StepLanding
-    price: float
+    price: float  # of both [m]
 
 
 _Made = tuple[Array, bool, Stride]

@@ -42,20 +42,13 @@ _GROWTH = 10.0
 
 
 class Pieces(NamedTuple):
-    """Pieces of the phases, in order; arrays are (n,).
+    """Pieces of the phases, in order; arrays are (n,)."""
 
-    Attributes:
-        duration: of each [s].
-        rate: w of each [1/s].
-        low, high: between which its p has to be [m].
-        wish: where p is liked best [m].
-    """
-
-    duration: Array
-    rate: Array
-    low: Array
+    duration: Array  # [s]
+    rate: Array  # w [1/s]
+    low: Array  # x between which p has to be [m]
     high: Array
-    wish: Array
+    wish: Array  # where p is liked best [m]
 
 
 @compiled
@@ -177,32 +170,20 @@ def pressure(
 
 
 class Ground(NamedTuple):
-    """Ground under both feet, and how its use is priced.
+    """Ground under both feet, and how its use is priced."""
 
-    Attributes:
-        rear, front: x of the feet [m].
-        low, high: x between which both together bear the centre of pressure [m].
-        gravity: its parts away from the ground and along it, backward [m/s^2].
-        reach: longest way from a foot to the CoM [m].
-        slack: excess that costs nothing [m].
-        pace: price of a second more or less than ``calm`` [m/s].
-        calm: duration that is liked best [s].
-        unloading: time before the end over which the rear foot gives up its load [s]; 0: it stays.
-        smooth, arrive: T and R [s].
-    """
-
-    rear: float
+    rear: float  # x of the feet [m]
     front: float
-    low: float
+    low: float  # x between which both together bear the centre of pressure [m]
     high: float
-    gravity: tuple[float, float]
-    reach: float
-    slack: float
-    pace: float
-    calm: float
-    unloading: float
-    smooth: float
-    arrive: float
+    gravity: tuple[float, float]  # its parts into the ground, and along it, backward [m/s^2]
+    reach: float  # longest way from a foot to the CoM [m]
+    slack: float  # excess that costs nothing [m]
+    pace: float  # price of a second more or less than the next [m/s]
+    calm: float  # duration that is liked best [s]
+    unloading: float  # time before the end in which the rear foot gives up its load [s]; 0: none
+    smooth: float  # T [s]
+    arrive: float  # R [s]
 
 
 @compiled

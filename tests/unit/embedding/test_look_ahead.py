@@ -18,22 +18,19 @@ from template_control.embedding.planners.ahead import (
 )
 from template_control.embedding.planners.gait_table import (
     CONTROL,
-    CONTROLS,
     SLOTS,
     STATE,
     STIFFNESS,
-    WIDTH,
     gait_table,
     row_at,
 )
 from template_control.embedding.planners.look_ahead import (
     BOUNDS,
     PER_STEP,
-    Plan,
     PlanTarget,
-    aimed,
     knee_moment,
     look_ahead,
+    new_plan,
     residuals,
     slopes,
 )
@@ -75,9 +72,7 @@ def table():
 def plan_from(z, speed, steps=3, **changes):
     """A plan's cost, the plan, and what it was made with."""
     known = plan_problem(P, table())._replace(**changes)
-    states, legs = np.empty((steps + 1, 3)), np.empty((steps, 3))
-    plan = Plan(states, np.empty((steps, CONTROLS)), legs, np.empty(WIDTH))
-    work = new_workspace()
+    plan, work = new_plan(steps), new_workspace()
     aim = PlanTarget(speed, np.zeros(3), ANY_ANGLE)
     cost, _ = look_ahead(known, work, z, aim, plan)
     return cost, plan, (known, work, aim)
@@ -86,12 +81,10 @@ def plan_from(z, speed, steps=3, **changes):
 @pytest.mark.parametrize("moment", [np.inf, 250.0])
 def test_derivatives_are_those_of_the_residuals(moment):
     z = row_at(table(), 0.8)[STATE : STATE + 3] + [0.03, 0.002, 0.16]
-    _, plan, (known, work, aim) = plan_from(z, 0.9, rounds=1, knee_moment=moment)
-    target, factor = np.empty(7), np.empty((3, 3))
-    aimed(known, aim, plan, target, factor)
+    _, plan, (known, work, _) = plan_from(z, 0.9, rounds=1, knee_moment=moment)
     size = plan.controls.size
     rows = np.empty((PER_STEP * len(plan.controls), size))
-    slopes(known, work, plan, factor, rows)
+    slopes(known, work, plan, rows)
     step = ReturnMap(P, "wp")
 
     def missed(change):
@@ -104,8 +97,8 @@ def test_derivatives_are_those_of_the_residuals(moment):
             states.append(result[:3])
             legs.append(result[REAR_BOTTOM:])
         out = np.empty(len(rows))
-        there = Plan(np.array(states), controls, np.array(legs), plan.row)
-        residuals(known, there, target, factor, out)
+        states, legs = np.array(states), np.array(legs)
+        residuals(known, plan._replace(states=states, controls=controls, lengths=legs), out)
         return out
 
     for column, change in zip(rows.T, 1e-6 * np.eye(size), strict=True):
