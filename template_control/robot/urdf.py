@@ -261,6 +261,12 @@ def _check_names(path: Path, robot: ET.Element) -> None:
                     f"{path}: joint {joint.get('name')!r} has no {end} link {name!r}: its links"
                     f" are {links}"
                 )
+    children = Counter(end_of(joint, "child") for joint in robot.findall("joint"))
+    for name, count in children.items():
+        if count > 1:
+            raise RobotError(f"{path}: link {name!r} is the child of {count} joints: cut the loop")
+    if len(children) == len(links):
+        raise RobotError(f"{path}: each link is a joint's child: one is to be the root")
 
 
 def _numbers(where: str, element: ET.Element, name: str, count: int, default: str = "") -> Array:

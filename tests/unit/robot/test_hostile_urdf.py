@@ -155,6 +155,25 @@ def test_a_fixed_joint_is_no_knee(load, bolt):
         load(bolt, **{**BOLT, "sagittal_joints": joints})
 
 
+@pytest.mark.parametrize(
+    ("first", "says"),
+    [("base_link", "'a' is the child of 2 joints: cut the loop"), (None, "one is to be the root")],
+)
+def test_links_in_a_loop_are_refused(load, bolt, first, says):
+    """Pinocchio's reader of URDFs would end the process, or say that there is no model."""
+    joint = '<joint name="{}" type="fixed"><parent link="{}"/><child link="{}"/></joint>'
+    loop = joint.format("ab", "a", "b") + joint.format("ba", "b", "a")
+    links = '<link name="a"/><link name="b"/>'
+    if first is None:
+        text = f'<robot name="ring">{links}{loop}</robot>'
+    else:
+        text = changed(
+            bolt, "</robot>", links + loop + joint.format("to_a", first, "a") + "</robot>"
+        )
+    with pytest.raises(RobotError, match=says):
+        load(text, **BOLT)
+
+
 # ---- numbers
 
 
