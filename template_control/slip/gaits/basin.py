@@ -36,7 +36,7 @@ def _for_each(name: str, rows: Array, count: int) -> Array:
     """One row, or ``count`` of them, as ``count`` rows."""
     if rows.ndim > 2 or (rows.ndim == 2 and len(rows) != count):
         raise ParameterError(f"{name} has shape {rows.shape}: give one row, or {count} of them")
-    return np.array(np.broadcast_to(rows, (count, rows.shape[-1])))
+    return np.array(np.broadcast_to(rows, (count, rows.shape[-1])), order="C")
 
 
 @checked
@@ -146,7 +146,7 @@ def steps_to_fall(
         goal: (n, 2) or (2,) y [m] and phi [rad] of the gait each should come to.
         limit: steps to take.
     """
-    states = np.array(z, dtype=float)
+    states = np.array(z, dtype=float, order="C")  # another layout would be compiled anew
     count = len(states)
     steps, converges = _many(
         stride_kernel(parameters, StrideKind.WALK),

@@ -13,7 +13,13 @@ from template_control.paper.stability import (
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.basin import margin, steps_to_fall, velocity_angle, vlo_state
+from template_control.slip.gaits.basin import (
+    _many,
+    margin,
+    steps_to_fall,
+    velocity_angle,
+    vlo_state,
+)
 from template_control.slip.gaits.branch import Kind
 from template_control.slip.gaits.gait import gait_from_energy
 from template_control.slip.maps.return_map import ReturnMap
@@ -32,6 +38,14 @@ def test_vlo_states_and_energies_belong_together():
         assert velocity_angle(state) == pytest.approx(angle)
         assert np.sign(state[2]) == -np.sign(angle), "downward is positive"
     assert np.isnan(vlo_state(P, 0.98, 0.0, 700.0)[0])
+
+
+def test_steps_are_compiled_once_whatever_the_arrays_layouts_are(paper_gait):
+    goal, z = np.array([0.9818, 0.0]), np.tile(paper_gait.vlo, (3, 1))
+    for states in (z[:1], z, np.asfortranarray(z), z[::2]):
+        steps_to_fall(P, states, paper_gait.controls, goal, limit=1)
+        steps_to_fall(P, states, np.tile(paper_gait.controls, (len(states), 1)), goal, limit=1)
+    assert len(_many.signatures) == 1
 
 
 @pytest.mark.slow(seconds=3)
