@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import MapKind, StrideKind
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import Prior, solve_stride, whole
 from template_control.slip.dynamics.stride import controls, simulate_stride
@@ -24,18 +24,13 @@ _STATE = np.array([1.1, 0.978, 0.0])
 _CONTROLS = controls(1.152, _K0, _K0)  # near a gait's, so that a stride passes all of its phases
 
 
-def closed_form_map() -> None:
-    """The improved closed-form map, which a search tries steps on."""
-    ReturnMap(_TEMPLATE, kind=MapKind.IMPROVED).step(_STATE, _CONTROLS)
-
-
 def derivatives() -> None:
     """The exact map's Jacobian, from which a planner's law is made."""
     ReturnMap(_TEMPLATE).linearise(_STATE, _CONTROLS)
 
 
-def exact_map() -> None:
-    """The exact map, with which gaits are found and steps planned."""
+def maps() -> None:
+    """The maps, exact or in closed form, with which gaits are found and steps planned."""
     ReturnMap(_TEMPLATE).step(_STATE, _CONTROLS)
     simulate_stride(_TEMPLATE, STRIDE_START[StrideKind.WALK], VLO.state(_STATE), _CONTROLS)
 
@@ -48,9 +43,8 @@ def solver() -> None:
 
 
 STRIDES = (
-    Part(closed_form_map, 4.2),
     Part(solver, 6.0),
     Part(derivatives, 4.7),
-    Part(exact_map, 2.8),
+    Part(maps, 4.2),
 )
 """Compiled functions of strides."""
