@@ -38,6 +38,11 @@ class Aim(NamedTuple):
 
     target: Array
     stiffness_range: Array
+    chooses: bool = True  # False: kappa_2 is given; a None would be compiled for itself
+
+
+NO_AIM = Aim(np.zeros(3), np.zeros(2), chooses=False)
+"""Of a step whose kappa_2 is given."""
 
 
 @compiled
@@ -45,7 +50,7 @@ def modified_step(
     kernel: Kernel,
     kind: int,
     z: Array,
-    aim: Aim | None,
+    aim: Aim,
     controls: Array,
     scratch: Scratch,
     result: Array,
@@ -53,16 +58,14 @@ def modified_step(
     """One step with kappa_2 of (38), kept within its bounds; returns the Outcome's value.
 
     As :func:`~template_control.slip.maps.return_map.one_stride`; kappa_2 of the controls is
-    overwritten, but without an ``aim``.
+    overwritten, if the ``aim`` chooses it.
     """
-    if aim is None:
-        return one_stride(kernel, kind, z, controls, scratch, result)
-    stiffness_range = aim.stiffness_range
-    # The first pass finds the virtual bottom, which kappa_2 does not influence.
-    controls[Slot.K_SD] = controls[Slot.K_SC]
+    if aim.chooses:
+        # The first pass finds the virtual bottom, which kappa_2 does not influence.
+        controls[Slot.K_SD] = controls[Slot.K_SC]
     outcome = one_stride(kernel, kind, z, controls, scratch, result)
     rear, front = result[REAR_BOTTOM], result[FRONT_BOTTOM]
-    if not np.isfinite(rear):
+    if not (aim.chooses and np.isfinite(rear)):
         return outcome
     target, rest_length, kappa_1 = aim.target, kernel.rest_length, controls[Slot.K_SC]
     mu_1 = (rest_length - target[1]) ** 2
@@ -71,7 +74,7 @@ def modified_step(
     kinetic = target[0] ** 2 + target[2] ** 2 - z[0] ** 2 - z[2] ** 2
     mu_4 = kernel.mass * (kinetic + 2.0 * kernel.gravity * (target[1] - z[1]))
     wanted = (mu_4 + (mu_3 - mu_2) * kappa_1) / (mu_3 - mu_1)
-    controls[Slot.K_SD] = min(max(wanted, stiffness_range[0]), stiffness_range[1])
+    controls[Slot.K_SD] = min(max(wanted, aim.stiffness_range[0]), aim.stiffness_range[1])
     return one_stride(kernel, kind, z, controls, scratch, result)
 
 
@@ -126,7 +129,7 @@ def search_angle(
 @compiled
 def modified_jacobian(
     at: tuple[Kernel, int, Array],
-    aim: Aim | None,
+    aim: Aim,
     controls: Array,
     columns: IntArray,
     work: MapWorkspace,
@@ -141,7 +144,7 @@ def modified_jacobian(
     """
     kernel, kind, z = at
     outcome = section_jacobian(kernel, kind, z, controls, columns, work, found)
-    if aim is None:
+    if not aim.chooses:
         return outcome
     result, jacobian, last = found.result, found.jacobian, columns.shape[0] - 1
     rest, kappa_1, kappa_2 = kernel.rest_length, controls[Slot.K_SC], controls[Slot.K_SD]

@@ -15,10 +15,15 @@ import numpy as np
 from numba import types
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled, inner_by_type
+from template_control.compiled import inner_by_type
 from template_control.slip.automaton.vocabulary import MapKind, Outcome, Slot
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
-from template_control.slip.control.modified_walking import Aim, modified_jacobian, modified_step
+from template_control.slip.control.modified_walking import (
+    NO_AIM,
+    Aim,
+    modified_jacobian,
+    modified_step,
+)
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.return_map import RESULTS, Derivatives, MapWorkspace, ReturnMap
@@ -40,7 +45,7 @@ class StrideEnd(NamedTuple):
     start: Array
     ends: IntArray  # (m,) which of the map's results are its end
     work: MapWorkspace
-    energy: Aim | None = None  # by which kappa_2 is chosen, (38); None: it is not
+    energy: Aim = NO_AIM  # by which kappa_2 is chosen, (38)
 
     def __call__(self, u: Array) -> tuple[Array, Outcome]:
         """(m,) where it ends, and how, with (NUM_SLOTS,) controls ``u``; (38) completes them."""
@@ -141,12 +146,6 @@ def _stride_slopes(problem: Any, x: Any, rows: Any) -> Any:
     return at if of_type(problem, StrideProblem) else None
 
 
-@compiled
-def _solve(problem: StrideProblem, search: Search, x: Array) -> float:
-    """:func:`~.least_squares.least_squares` for Python."""
-    return least_squares(problem, search, problem.stride.ends.shape[0] + x.shape[0], x)
-
-
 TARGET_ONLY = Search(rounds=20, close=1e-9, grid=0, save=1e-15, patience=5)
 """The target, to rounding, whatever the controls are before."""
 
@@ -175,7 +174,7 @@ def solve_stride(
     """
     slots, u = np.array(prior.slots), np.array(prior.controls)
     base, change, lower, upper = prior.table
-    chosen = [] if stride.energy is None else [int(Slot.K_SD)]
+    chosen = [int(Slot.K_SD)] if stride.energy.chooses else []
     columns = np.array([PADDED + slot for slot in (*prior.slots, *chosen)])
     problem = StrideProblem(
         stride=stride,
@@ -194,7 +193,7 @@ def solve_stride(
         jacobian=np.empty((RESULTS, len(columns))),
     )
     x = base.copy()
-    if _solve(problem, prior.search, x) < np.inf:
+    if least_squares(problem, prior.search, len(stride.ends) + len(x), x) < np.inf:
         return u, problem.result[stride.ends]
     u[slots] = base
     return u, None
