@@ -442,5 +442,5 @@ def whole_tick() -> None:
     act(kept, qp.answer_arrays(), 1e-3)
 
 
-CONTROL = (Part(whole_tick, 9.0),)
+CONTROL = (Part(whole_tick, 31.0),)
 """Compiled functions of a tick."""

@@ -29,6 +29,7 @@ from template_control.embedding.planners.modified import ModifiedOptions, Modifi
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.robot_template import check_apex, robot_route, standing_options
+from template_control.embedding.tick import CONTROL
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
@@ -246,7 +247,8 @@ class Experiment(Checked):
         assert isinstance(robot, Biped)
         if not e.free:
             _check_plane(robot, e)
-        ready(WALK)  # before the gait is looked for, which would compile a part of it alone
+        # Before the gait is looked for, which would compile a part of it alone.
+        ready((*CONTROL, *WALK))
         motion, steps, velocity = e.motion, e.steps, None
         if isinstance(motion, VelocityProfile | VelocityCommand):
             velocity, motion = velocity_route(robot, motion, e.course)

@@ -164,7 +164,7 @@ def record_row() -> None:
     write_row(row, (0.0,) * 7, state, (robot.data, robot.joint_places, robot.heading_frame), seen)
 
 
-RECORD = (Part(record_row, 1.5),)  # compiled functions of a recorder
+RECORD = (Part(record_row, 2.5),)  # compiled functions of a recorder
 
 
 class _Block(NamedTuple):

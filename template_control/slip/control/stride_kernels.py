@@ -1,8 +1,4 @@
-"""The compiled code of strides, maps and their solver, in parts that processes can compile.
-
-Each part calls compiled functions with arguments of the types that planners call them with. It has
-no result: what counts is that they are compiled then.
-"""
+"""The compiled code of strides, maps and their solver, in one part: each calls the one before."""
 
 from __future__ import annotations
 
@@ -24,27 +20,16 @@ _STATE = np.array([1.1, 0.978, 0.0])
 _CONTROLS = controls(1.152, _K0, _K0)  # near a gait's, so that a stride passes all of its phases
 
 
-def derivatives() -> None:
-    """The exact map's Jacobian, from which a planner's law is made."""
-    ReturnMap(_TEMPLATE).linearise(_STATE, _CONTROLS)
-
-
-def maps() -> None:
-    """The maps, exact or in closed form, with which gaits are found and steps planned."""
-    ReturnMap(_TEMPLATE).step(_STATE, _CONTROLS)
+def strides() -> None:
+    """A stride, a map and its Jacobian, and the solver, called as planners call them."""
     simulate_stride(_TEMPLATE, STRIDE_START[StrideKind.WALK], VLO.state(_STATE), _CONTROLS)
-
-
-def solver() -> None:
-    """The solver of strides."""
+    step = ReturnMap(_TEMPLATE)
+    step.step(_STATE, _CONTROLS)
+    step.linearise(_STATE, _CONTROLS)
     table = np.array([[_CONTROLS[0]], [1.0], [1.0], [1.2]])
     prior = Prior(_CONTROLS, [0], table, Search(1))
-    solve_stride(whole(ReturnMap(_TEMPLATE), _STATE), _STATE, prior, np.eye(3))
+    solve_stride(whole(step, _STATE), _STATE, prior, np.eye(3))
 
 
-STRIDES = (
-    Part(solver, 6.0),
-    Part(derivatives, 4.7),
-    Part(maps, 4.2),
-)
+STRIDES = (Part(strides, 31.0),)
 """Compiled functions of strides."""
