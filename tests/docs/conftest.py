@@ -5,6 +5,7 @@ import re
 import shlex
 import subprocess
 import sys
+from itertools import takewhile
 
 import pytest
 from places import ROOT
@@ -32,7 +33,7 @@ def run_block(tmp_path, monkeypatch, capfd, on_path):
     """Runs a page's block in an empty folder and gives what it prints on stdout.
 
     Python and commands run in this process, as importing the library for each takes two seconds; a
-    shell runs whatever else is in a block.
+    shell runs the rest of a block, from the first line on that needs one.
     """
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
@@ -41,13 +42,15 @@ def run_block(tmp_path, monkeypatch, capfd, on_path):
     def run(language, block):
         if language == "python":
             exec(compile(block, "a snippet", "exec"), {"__name__": "__main__"})
-        elif all(re.match(r"template-control [^$&|<>;]*$", x) for x in block.splitlines()):
-            for line in block.splitlines():
-                assert main(shlex.split(line)[1:]) == 0, f"{line}: {capfd.readouterr().err}"
-        else:
-            shell = ["bash", "-euo", "pipefail", "-c", block]
+            return capfd.readouterr().out
+        lines = block.splitlines()
+        plain = list(takewhile(re.compile(r"template-control [^$&|<>;]*$").match, lines))
+        for line in plain:
+            assert main(shlex.split(line)[1:]) == 0, f"{line}: {capfd.readouterr().err}"
+        if rest := "\n".join(lines[len(plain) :]):
+            shell = ["bash", "-euo", "pipefail", "-c", rest]
             done = subprocess.run(shell, timeout=300, env=on_path)
-            assert done.returncode == 0, f"{block}: {capfd.readouterr()}"
+            assert done.returncode == 0, f"{rest}: {capfd.readouterr()}"
         return capfd.readouterr().out
 
     yield run
