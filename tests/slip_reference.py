@@ -186,6 +186,13 @@ def at_once(event, ends):
 
 
 @njit
+def copy(source, target):
+    """As ``target[:] = source``, for whose refusal of other shapes Numba would compile strings."""
+    for j in range(4):
+        target[j] = source[j]
+
+
+@njit
 def _stride(tables, node, s, toes, u, world):
     """As :func:`stride`; ``s`` (4,) and ``toes`` (2,) are overwritten."""
     out, a, stages, nxt = np.empty(4), np.empty(4), np.empty((13, 4)), np.empty(4)
@@ -221,11 +228,11 @@ def _stride(tables, node, s, toes, u, world):
                 fired, at = e, t
         start = False
         if fired < 0:
-            s[:] = nxt
+            copy(nxt, s)
             time += h
             continue
         advanced(s, at, toes, k, world, stages, out)
-        s[:] = out
+        copy(out, s)
         slowest = min(slowest, abs(watched(tables.event[fired], s, toes, k, world, a)[1]))
         time, events, start = time + at, events + 1, True
         reset = tables.reset[fired]

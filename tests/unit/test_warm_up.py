@@ -127,10 +127,11 @@ def test_after_a_warm_up_no_command_compiles(tmp_path, monkeypatch):
         "walk --steps 3 --push 60@1 --no-figures",
         "run --steps 2 --no-figures",
         f"go {EXAMPLES}/zero_five_zero.toml --robot runner --steps 5 --no-figures",
-        "walk --steps 2 --from-stand --to-stand --plant ideal --no-figures",
+        "walk --steps 2 --from-stand --to-stand --no-figures",
+        "walk --steps 1 --plant ideal --no-figures",
         "walk --steps 2 --plant mujoco --terrain slope:angle=2 --no-figures",
         "walk --robot bolt --free --steps 2 --no-figures",
-        f"slip {EXAMPLES}/example_one.toml",
+        f"slip {EXAMPLES}/example_one.toml --no-figures",
         "gaits",
         "reproduce table3",
     )
