@@ -28,7 +28,10 @@ def pytest_collection_modifyitems(items):
 
     def seconds(item):
         mark = item.get_closest_marker("slow")
-        return mark.kwargs.get("seconds", 0.0) if mark else 0.0
+        if mark is None:
+            return 0.0
+        assert not mark.args, f"{item.nodeid}: slow(seconds=...), by name"
+        return mark.kwargs.get("seconds", 0.0)
 
     items.sort(key=seconds, reverse=True)
 

@@ -69,7 +69,7 @@ def test_few_failures_are_no_warning(caplog):
 
 
 @pytest.mark.parametrize("number", [0, 1])
-@pytest.mark.slow(6)
+@pytest.mark.slow(seconds=6)
 def test_a_swing_without_a_touchdown_in_sight_holds_its_foot(number):
     """Its reference was NaN, and no QP was solved from then on until the robot lay."""
     found = trial({"robot": {"model": "bolt", "free": True}}, "noise", 0.02, number)

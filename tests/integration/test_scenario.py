@@ -13,7 +13,6 @@ from template_control.cli.main import main
 from template_control.errors import RecordError, ScenarioError
 from template_control.paper import REPRODUCTIONS
 from template_control.paper.example_one import summary
-from template_control.run.record import Record
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment, example_one, load_scenario
@@ -176,21 +175,6 @@ LESS = {
     "fig12": {"planners": ("LQR", "modified, exact map"), "steps": 34},
     "fig13": {"steps": 8},
 }
-
-
-@pytest.mark.slow(seconds=6)
-def test_example_one_on_a_robot(tmp_path, capfd):
-    asked = ["go", str(EXAMPLES / "example_one.toml"), "--robot", "runner", "--json"]
-    assert main([*asked, "--no-figures", "--output", str(tmp_path)]) == 0
-    data = json.loads(capfd.readouterr().out)
-    assert not data["fell"]
-    assert data["speed_error_rms"] <= 0.15
-    assert data["qp_failures"] == 0
-    record = Record.load(tmp_path / "run.npz")
-    assert record.arrived
-    # 20 steps, and one from the last section on.
-    assert record.kinds_of_stride[-22:] == ["rw", *["w"] * 21]
-    assert record.section_state[:, 0].max() == pytest.approx(5.0, abs=0.05)
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_g1_stands_walks_and_stands_again():
     assert (np.nanmax(off[record.in_phase(Phase.SS)], axis=0) <= record.soles[:, 2:] + 2e-3).all()
 
 
-@pytest.mark.slow(8)
+@pytest.mark.slow(seconds=8)
 def test_g1_walks_and_is_recorded(tmp_path):
     record = walk("g1", 6)
     check(record, 6)
@@ -79,12 +79,12 @@ def test_g1_walks_and_is_recorded(tmp_path):
     assert low < trunk.min() < trunk.max() < high, "its trunk is in the film"
 
 
-@pytest.mark.slow(6)
+@pytest.mark.slow(seconds=6)
 def test_talos_walks_with_the_same_tuning():
     check(walk("talos", 4), 4)
 
 
-@pytest.mark.slow(7)
+@pytest.mark.slow(seconds=7)
 def test_g1_walks_with_all_its_joints():
     record = walk("g1", 4, upper_body=True)
     check(record, 4)
@@ -93,7 +93,7 @@ def test_g1_walks_with_all_its_joints():
     assert np.abs(arms_and_waist).max() < 0.05
 
 
-@pytest.mark.slow(10)
+@pytest.mark.slow(seconds=10)
 @pytest.mark.parametrize("scale", [0.9, 1.1])
 def test_another_mass_walks_and_is_learnt(scale):
     record = walk("g1", 7, world=PlantOptions(mass_scale=scale))
@@ -101,7 +101,7 @@ def test_another_mass_walks_and_is_learnt(scale):
     assert record.section_load[-1] == pytest.approx(scale, abs=0.04)
 
 
-@pytest.mark.slow(9)
+@pytest.mark.slow(seconds=9)
 @pytest.mark.parametrize(
     ("impulse", "heading", "steps"),
     [(15.0, 270.0, []), (15.0, 180.0, ["sb"]), (22.5, 90.0, ["sf"])],
@@ -119,7 +119,7 @@ def test_a_pushed_stand_is_held_or_caught_by_steps(impulse, heading, steps):
     assert np.ptp(record.space_com[still], axis=0).max() < 5e-3
 
 
-@pytest.mark.slow(5)
+@pytest.mark.slow(seconds=5)
 def test_g1_stops_from_a_walk_to_the_left():
     """The foot of the last step goes along, and the CoM comes to rest between both feet."""
     rows = ((0.0, 0.46, 0.1, -0.1), (4.5, 0.0, 0.0, 0.0))
@@ -138,7 +138,7 @@ def test_g1_stops_from_a_walk_to_the_left():
     assert np.hypot(*middle[:2]) < 5e-3
 
 
-@pytest.mark.slow(3)
+@pytest.mark.slow(seconds=3)
 def test_g1_runs():
     """With flight, at its speed, and with its motors hardly ever at their limits."""
     spec = tc.robot.RobotSpec("g1", free=True)

@@ -137,8 +137,10 @@ def test_runner_goes_through_example_one_as_its_template_does(tmp_path, monkeypa
     assert kinds["wr"] == kinds["rw"] == 1
     # The last segment's twenty steps, and those of the first 0.8 s.
     assert 21 <= kinds["w"] <= 23
+    # And one from the last section on.
+    assert record.kinds_of_stride[-22:] == ["rw", *["w"] * 21]
     speed = record.section_state[:, 0]
-    assert speed.max() > 4.9
+    assert speed.max() == pytest.approx(5.0, abs=0.05)
     error = speed[1:] - record.section_target[:-1, 0]
     assert np.sqrt(np.mean(error**2)) < 0.15
     settled(record)

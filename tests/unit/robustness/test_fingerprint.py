@@ -106,7 +106,7 @@ print(*{name.split(".")[1] for name in sys.modules if name.startswith("template_
     assert not rooms & set(fingerprint.WITHOUT)
 
 
-@pytest.mark.slow(4)
+@pytest.mark.slow(seconds=4)
 def test_the_digest_is_that_of_every_process():
     code = "from template_control.robustness import fingerprint as f; print(f._code(f._PACKAGE))"
     assert _told(code, "1") == _told(code, "2") == fingerprint._code(fingerprint._PACKAGE) + "\n"

@@ -59,7 +59,7 @@ def _command(line, folder, *more):
 
 
 @pytest.mark.parametrize("line", LINES.values(), ids=LINES)
-@pytest.mark.slow(4)
+@pytest.mark.slow(seconds=4)
 def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
     first = _command(line, tmp_path / "first")
     file = tmp_path / "first" / "run.toml"

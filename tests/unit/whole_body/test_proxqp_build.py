@@ -33,12 +33,12 @@ def own():
     return _builds("import proxsuite\n")[0][-1]
 
 
-@pytest.mark.slow(4)
+@pytest.mark.slow(seconds=4)
 def test_an_import_decides_nothing(own):
     assert _builds(IMPORTS + TELL + "import proxsuite\n")[0] == ["[]", own]
 
 
-@pytest.mark.slow(4)
+@pytest.mark.slow(seconds=4)
 def test_a_robots_qp_takes_the_portable_build_and_the_log_says_so():
     loud = "import logging\nlogging.basicConfig(level=logging.INFO)\n"
     build, told = _builds(loud + IMPORTS + QP)
@@ -47,7 +47,7 @@ def test_a_robots_qp_takes_the_portable_build_and_the_log_says_so():
     assert "TEMPLATE_CONTROL_PROXQP=native" in told
 
 
-@pytest.mark.slow(6)
+@pytest.mark.slow(seconds=6)
 def test_who_wants_another_build_has_it(own):
     assert _builds("import proxsuite\n" + QP)[0] == [own]
     assert _builds(QP, build="native")[0] == [own]
