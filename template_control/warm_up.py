@@ -70,9 +70,9 @@ def ready(parts: Sequence[Part]) -> None:
     missing = [part for part in wanted if not part.done]
     with _uncollected():
         _compile(missing)
-    for part in wanted:
-        part.compile()
-        _READY.add(part)
+        for part in wanted:
+            part.compile()
+            _READY.add(part)
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import importlib
 import io
 import logging
@@ -133,6 +134,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     output = _standard_streams()
     on_signals(end_at_once)
     insist()
+    gc.disable()  # what is imported stays: to look through it, now and at the end, takes a quarter
     try:
         status = _command(sys.argv[1:], output)
         if stopped():
@@ -149,6 +151,8 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
     try:
         options = build_parser(arguments).parse_args(arguments)
         if output is not None:
+            gc.freeze()
+            gc.enable()
             on_signals(interrupt)
         with printed(logging.getLogger("template_control.robot")):  # such as missing meshes
             status = int(options.run(options))
