@@ -220,7 +220,8 @@ def advance(kept: Any, dt: float) -> None:
     move_clock(t.path, curve, s, mode, want, (r.com_velocity[0], dt))
     move_swings(t, r, want, dt)
     _move_in_space(t, r, want, lateral, dt)
-    want.com_now[:] = s.state
+    for i in range(4):
+        want.com_now[i] = s.state[i]
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
     want.lead, want.ahead = t.path.offset, np.nan
@@ -442,5 +443,5 @@ def whole_tick() -> None:
     act(kept, qp.answer_arrays(), 1e-3)
 
 
-CONTROL = (Part(whole_tick, 31.0),)
+CONTROL = (Part(whole_tick, 28.0),)
 """Compiled functions of a tick."""

@@ -112,10 +112,19 @@ def _point(count: int, size: int) -> _Point:
 
 
 @compiled
+def _set(target: Array, source: Array) -> None:
+    """As ``target[:] = source`` (n,), which Numba compiles with texts about wrong shapes."""
+    for i in range(target.shape[0]):
+        target[i] = source[i]
+
+
+@compiled
 def _copy(source: _Point, target: _Point) -> None:
-    target.x[:] = source.x
-    target.residual[:] = source.residual
-    target.rows[:] = source.rows
+    _set(target.x, source.x)
+    _set(target.residual, source.residual)
+    for r in range(source.rows.shape[0]):
+        for i in range(source.rows.shape[1]):
+            target.rows[r, i] = source.rows[r, i]
 
 
 @compiled
@@ -131,7 +140,7 @@ def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
         cost = evaluate(problem, there.x, there.residual)
         if cost < least:
             least = cost
-            best.x[:] = there.x
+            _set(best.x, there.x)
     return least
 
 
@@ -144,7 +153,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
     """
     size = x.shape[0]
     here, best, there = _point(count, size), _point(count, size), _point(count, size)
-    best.x[:] = x
+    _set(best.x, x)
     least = evaluate(problem, best.x, best.residual)
     if not least < np.inf:
         if not _from_grid(problem, search.grid, there, best) < np.inf:
@@ -158,7 +167,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
         longest, foreseen = 0.0, 0.0
         for i in range(size):
             longest = max(longest, abs(aim[i] - here.x[i]) / problem.change[i])
-        there.x[:] = aim
+        _set(there.x, aim)
         for r in range(count):
             linear = here.residual[r]
             for i in range(size):
@@ -181,14 +190,14 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
             _copy(best, here)
             continue
         if known and last:
-            best.x[:] = there.x
+            _set(best.x, there.x)
         if last:
             break
         slopes(problem, there.x, there.rows)
         _copy(there, here)
         if known:
             _copy(there, best)
-    x[:] = best.x
+    _set(x, best.x)
     if not known:
         evaluate(problem, x, there.residual)
     return least
