@@ -20,6 +20,7 @@ from template_control.checks import option_types as values
 from template_control.checks import typed
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Degrees, Positive, Range
+from template_control.embedding.planners.change_search import change_data, search_changes
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.control.controllers import (
@@ -43,7 +44,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.storage import Files, writing
-from template_control.terminal import report, table
+from template_control.terminal import progress_bar, report, table
 from template_control.view.stability_figures import UNITS, branch_figure, speed_family_figure
 from template_control.view.style import save_figure
 
@@ -104,6 +105,12 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         " ships it, a figure and a table; about a minute",
     )
     parser.add_argument(
+        "--changes",
+        action="store_true",
+        help="search the changes of speed anew instead, walking steps from gait to gait: their"
+        " file, as the library ships it, and a table; about 10 minutes",
+    )
+    parser.add_argument(
         "--fix",
         action="append",
         metavar="QUANTITY=VALUE",
@@ -146,15 +153,20 @@ def run(options: argparse.Namespace) -> int:
     with nullcontext() if options.no_figures else writing(options.output) as folder:
         if options.family:
             return make_family(folder, options.json)
+        if options.changes:
+            return make_changes(folder, options.json)
         return _branch(options, folder)
 
 
 def _complete(options: argparse.Namespace) -> None:
     """Check options of a branch, and set those that are not given: quantities by their names."""
-    if options.family:
-        idle = [n for n in ("fix", "controlled", "start", "limits") if getattr(options, n)]
-        if idle:
-            raise ParameterError(f"--{idle[0]} does not go with --family: leave one out")
+    for search in ("family", "changes"):
+        if not getattr(options, search):
+            continue
+        branch = ("fix", "controlled", "start", "limits")
+        for other in (*branch, *(("changes",) if search == "family" else ())):
+            if getattr(options, other):
+                raise ParameterError(f"--{other} does not go with --{search}: leave one out")
         return
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
@@ -324,6 +336,24 @@ def make_family(folder: Path | None, as_json: bool) -> int:
         ]
     lines = (f"written: {path}" for path in paths if path is not None)
     report(as_json, data, _family_table(chains), lines=lines)
+    files.raise_pending()
+    return 0
+
+
+def make_changes(folder: Path | None, as_json: bool) -> int:
+    """Search the changes of speed, write their file into a folder, if any, and print them."""
+    with progress_bar("changes of speed", 1.0) as done:
+        found = search_changes(done=done)
+    data, files, lines = change_data(found), Files(), []
+    if folder is not None:
+        text = json.dumps(data) + "\n"
+        path = files.write(lambda: storage.write_text(folder / "speed_changes.json", text))
+        lines = [] if path is None else [f"written: {path}"]
+    speeds = sorted({speed for ends in found for speed in ends})
+    steps = {ends: str(len(change.controls)) for ends, (_, change) in found.items()}
+    rows = [[f"{a:g}", *(steps.get((a, b), "") for b in speeds)] for a in speeds]
+    title = "steps from one speed at VLO [m/s] to another one, for 80 kg and l0 = 1 m"
+    report(as_json, data, table(title, ["", *map("{:g}".format, speeds)], rows), lines=lines)
     files.raise_pending()
     return 0
 

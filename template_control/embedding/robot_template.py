@@ -14,7 +14,9 @@ from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
 from template_control.embedding.free.options import SOLE_STAND
+from template_control.embedding.planners.ahead import WalkLimits
 from template_control.embedding.planners.gait_table import STATE, gait_table, row_at
+from template_control.embedding.planners.lqr import KNEE_MOMENT
 from template_control.embedding.planners.running import AGILE
 from template_control.embedding.standing.curves import StandingOptions
 from template_control.errors import GaitError, ScenarioError
@@ -72,6 +74,7 @@ _SWING_TORQUE = 0.5  # of a hip's limit: rabbit walked with 0.49, and 0.06 m/s t
 # On soles: TALOS kept 0.90 m/s with 0.547 of its hips; G1 0.9 m/s, 0.352, and fell at 0.376.
 _SOLES_WALKED, _SOLES_SWING_TORQUE = (_WALKED[0], 0.36), 0.55
 _STANCE_TORQUE = 0.73  # of a knee's limit: human walked with 0.72, and fell with 0.79
+_BORNE = 0.92  # of a knee's limit: it needs 1.05 of the template leg's moment at most
 _UNEVEN = 0.42  # of the speed at VLO: rabbit walked with 0.41, and fell with 0.46
 # Slopes that a walk of 30 steps from a stand climbed and descended [rad]: uphill by what the swing
 # of the legs makes of the speed at VLO, as a share of it (bolt, human, rabbit), downhill by the
@@ -272,6 +275,20 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
     return torque / len(robot.groups[0])  # knees that bend together
 
 
+def walk_limits(robot: Biped) -> WalkLimits:
+    """Limits of the walks that are planned for a robot."""
+    p = template_for(robot)
+    torque = min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
+    moment = _BORNE * torque * len(robot.groups[0])  # knees that bend together
+    usual = KNEE_MOMENT * p.rest_length / REFERENCE.rest_length * p.mass * p.gravity
+    try:
+        speeds = walking_speeds(robot)
+    except GaitError:
+        speeds = family_speeds(p)
+    slowest, fastest = (float(gait_for_speed(p, speed).vlo[0]) for speed in speeds)
+    return WalkLimits(min(moment, usual), (slowest, fastest), not _heavy(robot))
+
+
 def _shortest_leg(gait: RunningGait) -> float:
     """Length of the template's leg at the bottom [m]."""
     result, _ = ReturnMap(gait.parameters, gait.stride).evaluate(gait.apex, gait.controls)
@@ -299,11 +316,15 @@ def standing_options(robot: Biped) -> StandingOptions:
 
 def can_run(robot: Biped) -> bool:
     """True if a robot runs: on points, with light legs, and knees that bear it."""
-    legs = sum(map(len, robot.groups)) * robot.leg_mass / robot.mass
-    if robot.patches or legs >= _HEAVY:
+    if robot.patches or _heavy(robot):
         return False
     p = template_for(robot)
     return _bears(robot, _RUN * p.speed_unit, suited_height(_RUN) * p.rest_length, 1.0)
+
+
+def _heavy(robot: Biped) -> bool:
+    """True if a robot's legs are most of its mass."""
+    return sum(map(len, robot.groups)) * robot.leg_mass >= _HEAVY * robot.mass
 
 
 def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Positive = 1.0) -> None:

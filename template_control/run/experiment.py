@@ -28,7 +28,12 @@ from template_control.embedding.planners.lqr import WALK, LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
-from template_control.embedding.robot_template import check_apex, robot_route, standing_options
+from template_control.embedding.robot_template import (
+    check_apex,
+    robot_route,
+    standing_options,
+    walk_limits,
+)
 from template_control.embedding.tick import CONTROL
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
@@ -269,7 +274,7 @@ class Experiment(Checked):
             found, planner = e._route(robot, motion)
             start = e.start
         else:
-            found, planner = e._kept(motion)
+            found, planner = e._kept(motion, robot)
             start = e.start if e.seed is None else perturbed_start(found, e.seed)
         if e.strict:
             _check_strictly(found, planner)
@@ -280,12 +285,12 @@ class Experiment(Checked):
         rest = {"seed": None, "strict": False, "velocity": velocity, "changes": changes}
         return PreparedExperiment(**{**same, **new, **rest})
 
-    def _kept(self, motion: Gait | None) -> tuple[Gait, Planner]:
+    def _kept(self, motion: Gait | None, robot: Biped) -> tuple[Gait, Planner]:
         """The gait that is kept, and its planner."""
         planner = self.planner
         if isinstance(planner, _SPECS):
             assert motion is not None
-            made = _planner(planner, motion)
+            made = _planner(planner, motion, robot)
             return made.gait if isinstance(made, AheadPlanner) else motion, made
         if not isinstance(planner, Planner):
             raise ParameterError("planners by kind of stride need a motion that is a route")
@@ -301,15 +306,18 @@ class Experiment(Checked):
             motion = robot_route(robot, motion, push_off)
         if planner is None and isinstance(motion, SpeedRoute):
             planner = self.tuning.planning.ahead
+        standing, limits = standing_options(robot), walk_limits(robot)
         if planner is None:
-            return motion, default_planners(motion, standing=standing_options(robot))
+            return motion, default_planners(motion, standing=standing, limits=limits)
         if isinstance(planner, Mapping):
             return motion, planner
         if isinstance(planner, AheadOptions):
-            planner = AheadPlanner(motion.parameters, planner, first_speed(motion))
+            speed = first_speed(motion)
+            planner = AheadPlanner(motion.parameters, planner, speed, limits=limits)
         elif isinstance(planner, _SPECS):
-            planner = _planner(planner, walking_gait(motion.parameters, first_speed(motion)))
-        return motion, default_planners(motion, planner, standing=standing_options(robot))
+            gait = walking_gait(motion.parameters, first_speed(motion))
+            planner = _planner(planner, gait, robot)
+        return motion, default_planners(motion, planner, standing=standing)
 
     @checked
     def save(self, path: str | Path) -> Path:
@@ -443,7 +451,7 @@ def _pushes_off(planner: PlannerSpec | Planner | None) -> bool:
     return isinstance(planner, AheadOptions)
 
 
-def _planner(spec: PlannerSpec, gait: Gait) -> Planner:
+def _planner(spec: PlannerSpec, gait: Gait, robot: Biped) -> Planner:
     """The planner of a gait."""
     if isinstance(spec, OwnPlanner):
         return spec.make(gait)
@@ -455,7 +463,8 @@ def _planner(spec: PlannerSpec, gait: Gait) -> Planner:
         if isinstance(spec, ModifiedOptions):
             return ModifiedPlanner(gait, spec)
         if isinstance(spec, AheadOptions):
-            return AheadPlanner(gait.parameters, spec, float(gait.vlo[0]))
+            speed, limits = float(gait.vlo[0]), walk_limits(robot)
+            return AheadPlanner(gait.parameters, spec, speed, limits=limits)
     raise ParameterError(f"planner {spec.kind} does not plan gait {gait.name}: leave one out")
 
 

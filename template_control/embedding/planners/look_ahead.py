@@ -1,41 +1,31 @@
-"""The cost of a plan of several walking steps, with its derivatives.
+"""Plan of several walking steps near a reference, as a least-squares problem.
 
-Over N steps with controls u_0 to u_(N-1) and states z_1 to z_N at VLO, it is:
+Unknowns are the controls u_0 to u_(N-1) and the states z_1 to z_(N-1) at VLO between the steps
+(direct multiple shooting). With the reference's states r_i and controls v_i, the aimed gait's state
+z*, and the robot's offset d, the plan minimises
 
-    sum |(z_i - z*) / tolerance|^2 + |(u_i - u*) / control tolerance|^2 + (rise beyond)^2
-    + (knee moments beyond)^2 + (z_N - z*)' P (z_N - z*)
+    sum |(P(z_i, u_i) + d - z_(i+1)) / defect|^2 + |(z_i - r_i) / tolerance|^2
+    + |(u_i - v_i) / control tolerance|^2
+    + (rise beyond)^2 + (knee moments beyond)^2 + (touchdown too soon)^2
+    + (P(z_(N-1), u_(N-1)) + d - z*)' C (P(z_(N-1), u_(N-1)) + d - z*)
 
-z* and u* are the aimed gait's, shifted so that the robot, with its offset, settles on it; the
-sum over states ends at z_(N-1); P is the LQR's cost-to-go of the same costs.
+C is the LQR's cost-to-go of the gait aimed at.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from template_control.arrays import Array, IntArray
-from template_control.cholesky import cholesky
-from template_control.compiled import compiled
-from template_control.embedding.planners.gait_table import (
-    CONTROL,
-    CONTROL_TOLERANCE,
-    CONTROLS,
-    COST,
-    GAIN,
-    SETTLING,
-    SLOTS,
-    STATE,
-    STIFFNESS,
-    WIDTH,
-    GaitTable,
-    gait_row,
-)
-from template_control.embedding.planners.lqr import ANGLE_RANGE, STIFFNESS_RANGE
+from template_control.compiled import compiled, inner_by_type
+from template_control.embedding.planners.gait_table import CONTROLS, SLOTS, STATE_TOLERANCE
+from template_control.embedding.planners.lqr import ANGLE_RANGE
 from template_control.embedding.planners.step_search import steepest
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.control.least_squares import bounded_step
+from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
+from template_control.slip.control.stride_solver import of_type
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
     EXACT,
@@ -43,340 +33,330 @@ from template_control.slip.maps.return_map import (
     RESULTS,
     Derivatives,
     MapWorkspace,
+    new_workspace,
     one_stride,
     section_jacobian,
 )
 
-BOUNDS = np.array(
-    [[angle, *[share] * 3] for angle, share in zip(ANGLE_RANGE, STIFFNESS_RANGE, strict=True)]
-)
-"""(2, 4) least and greatest alpha relative to the gait's [rad], and stiffnesses over k."""
-_DONE = 0.02  # of the cost: a Gauss-Newton step that lowers it by less is the last
-_SHARES = (1.0, 0.5, 0.25, 0.125, 0.0)  # of a Gauss-Newton step, until one lowers the cost
-_LESS = 0.5  # of the LQR's feedback, where the template cannot do it
+BOUNDS = np.array([[ANGLE_RANGE[0], 0.35, 0.35, 0.35], [ANGLE_RANGE[1], 1.5, 1.5, 1.5]])
+"""(2, 4) least and greatest alpha relative to the reference's [rad], and stiffnesses over k.
+
+What a softer leg does to the knees is a limit of its own here; with 0.5 speeds change later.
+"""
+STATES = 3
+"""Of a section at VLO."""
+BLOCK = CONTROLS + STATES
+"""Unknowns of a step: its controls, and the state after it."""
+_KNEES = 5
+_STATE, _CONTROL = STATES, 2 * STATES
+_RISE = _CONTROL + CONTROLS
+_KNEE = _RISE + 1
+_SOON = _KNEE + _KNEES
+PER_STEP = _SOON + 1
+"""Residuals of a step: the defect, or the last end; states, controls, what rises beyond, what
+the knees bear beyond (the rear and the front leg at the virtual bottom, the rear leg just after
+touchdown, the stance leg at the VLO before and after), and what a foot lands too soon."""
+_KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
+_SOON_TOLERANCE = 0.001  # height over l0 that a foot lands too high and costs 1
+DEFECT = np.array([0.004, 0.0008, 0.008])
+"""Differences between a step's end and the next one's start that cost 1, for the reference."""
+SMALL = np.array([0.03, 0.003, 0.04])
+"""Changes of a state over which a step is to be nearly linear, for the reference."""
+SEARCH = Search(rounds=12, close=0.03, grid=0, save=0.02, damping=1e-3)
+"""Gauss-Newton steps of a plan."""
 
 
-class PlanProblem(NamedTuple):
+class PlanCosts(NamedTuple):
     """Model and costs of every plan."""
 
     kernel: Kernel  # the step
-    table: GaitTable
+    defect: Array  # (3,) differences between a step's end and the next one's start that cost 1
     tolerance: Array  # (3,) differences of the states that cost 1
-    ease: float  # control tolerances over those of the gaits' table
+    control_tolerance: Array  # (4,) differences of alpha [rad] and of the shares that cost 1
     rise: tuple[float, float]  # |dy/dt| that costs nothing, and what is beyond and costs 1 [m/s]
     knee_reach: float  # length of the leg at which the knee is straight [m]
     knee_moment: float  # of the leg force about the knee that costs nothing [N m]
     earliest: float  # the foot lands so long after VLO at the soonest [s]
-    rounds: int  # Gauss-Newton steps at most
+    unit: Array  # (3,) of states, those of the reference template being 1
     columns: IntArray  # (7,) of the map's derivatives, states and controls
 
 
-class PlanTarget(NamedTuple):
-    """Speed, offset and angles that a plan is made for."""
+class Reference(NamedTuple):
+    """N steps that a plan stays near, and the gait that it leads to."""
 
-    speed: float  # dx/dt at VLO of the aimed gait [m/s]
+    states: Array  # (N, 3) at the VLO after each step
+    controls: Array  # (N, 4) alpha and shares of the step's stiffness
+    stiffness: Array  # (N,) [N/m]
+    end: Array  # (3,) the gait's state
+    factor: Array  # (3, 3) L with C = L L'
+
+
+class PlanProblem(NamedTuple):
+    """Question for a plan of N steps, a problem of :mod:`~.control.least_squares`."""
+
+    costs: PlanCosts
+    start: Array  # (3,) the present state
     offset: Array  # (3,) what the robot adds to each step of the template
-    angles: tuple[float, float]  # least and greatest touchdown angle of the first step [rad]
+    reference: Reference
+    ends: Array  # (N, 3) of the steps, overwritten
+    lengths: Array  # (N, 5) of legs, where knees count [m], overwritten
+    change: Array
+    lower: Array
+    upper: Array
+    usual: Array  # (3,) differences of states by which roughness is measured
+    small: Array  # (3,) changes of states over which it is
+    z: Array  # (3,), and the next three: of the step at hand
+    u: Array
+    result: Array
+    jacobian: Array
+    work: MapWorkspace
 
 
-STATES = 3
-"""Of a section at VLO."""
-_KNEES = 3
-
-
-class Plan(NamedTuple):
-    """Plan of N steps."""
-
-    states: Array  # (N + 1, 3) at VLO, the present one first
-    controls: Array  # (N, 4) alpha and shares of the aimed gait's k
-    # (N, 3) of the rear and the front leg at the virtual bottom, and of the rear leg at touchdown
-    # [m]
-    lengths: Array
-    row: Array  # of the aimed gait, see gait_table
-    target: Array  # (7,) z*, u*: that gait, as the robot settles on it
-    factor: Array  # (3, 3) L with P = L L'
-
-
-def new_plan(steps: int) -> Plan:
-    """Room for a plan."""
-    states, free = np.empty((steps + 1, STATES)), np.empty((steps, CONTROLS))
-    lengths, row = np.empty((steps, _KNEES)), np.empty(WIDTH)
-    target, factor = np.empty(STATES + CONTROLS), np.empty((STATES, STATES))
-    return Plan(states, free, lengths, row, target, factor)
-
-
-_LIMITS = STATES + CONTROLS
-PER_STEP = STATES + CONTROLS + 1 + _KNEES
-"""Residuals of a step: states, controls, what rises beyond, what the knees bear beyond: of the rear
-and of the front leg at the virtual bottom, and of the rear leg just after touchdown."""
-_KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
-
-
-@compiled
-def _aimed(p: PlanProblem, aim: PlanTarget, plan: Plan) -> None:
-    """Write the gait that a plan aims at, and what belongs to it."""
-    row, target, factor = plan.row, plan.target, plan.factor
-    gait_row(p.table, aim.speed, row)
-    for i in range(STATES + CONTROLS):
-        target[i] = row[STATE + i]
-        for j in range(STATES):
-            target[i] += row[SETTLING + STATES * i + j] * aim.offset[j]
-    for i in range(STATES):
-        for j in range(STATES):
-            factor[i, j] = row[COST + STATES * i + j]
-    cholesky(factor, STATES)
+def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
+    """Room for plans of so many steps."""
+    size, controls = BLOCK * steps - STATES, np.empty((steps, CONTROLS))
+    states, square = np.empty((steps, STATES)), np.empty((STATES, STATES))
+    change = np.tile([*costs.control_tolerance, *costs.tolerance], steps)[:size]
+    return PlanProblem(
+        costs=costs,
+        start=np.empty(STATES),
+        offset=np.empty(STATES),
+        reference=Reference(states, controls, np.empty(steps), np.empty(STATES), square),
+        ends=np.empty((steps, STATES)),
+        lengths=np.empty((steps, _KNEES)),
+        change=change,
+        lower=np.full(size, -np.inf),
+        upper=np.full(size, np.inf),
+        usual=STATE_TOLERANCE * costs.unit,
+        small=SMALL * costs.unit,
+        z=np.empty(STATES),
+        u=np.zeros(NUM_SLOTS),
+        result=np.empty(RESULTS),
+        jacobian=np.empty((RESULTS, BLOCK)),
+        work=new_workspace(),
+    )
 
 
 @compiled
-def slots_of(plan: Plan, i: int, u: Array) -> None:
-    """Write the controls of step ``i`` by :class:`Slot` into ``u`` (NUM_SLOTS,)."""
-    for j in range(NUM_SLOTS):
-        u[j] = 0.0
-    for j in range(CONTROLS):
-        unit = 1.0 if j == 0 else plan.row[STIFFNESS]
-        u[SLOTS[j]] = plan.controls[i, j] * unit
-
-
-@compiled
-def residuals(p: PlanProblem, plan: Plan, out: Array) -> float:
-    """Write the errors of a plan, in tolerances, into ``out`` (11 N,); return the cost."""
-    target, factor = plan.target, plan.factor
-    steps, cost = plan.controls.shape[0], 0.0
-    for i in range(steps):
-        row = PER_STEP * i
-        for j in range(STATES):
-            if i < steps - 1:
-                out[row + j] = (plan.states[i + 1, j] - target[j]) / p.tolerance[j]
-            else:
-                out[row + j] = 0.0
-                for k in range(j, STATES):
-                    out[row + j] += factor[k, j] * (plan.states[i + 1, k] - target[k])
-        for j in range(CONTROLS):
-            miss = plan.controls[i, j] - target[STATES + j]
-            out[row + STATES + j] = miss / (p.ease * CONTROL_TOLERANCE[j])
-        beyond = abs(plan.states[i + 1, 2]) - p.rise[0]
-        out[row + _LIMITS] = max(beyond, 0.0) / p.rise[1]
-        for leg in range(_KNEES):
-            moment = knee_moment(p, plan, i, leg)[0]
-            beyond = (moment / p.knee_moment - 1.0) / _KNEE_TOLERANCE
-            out[row + _LIMITS + 1 + leg] = max(beyond, 0.0)
-    for i in range(PER_STEP * steps):
-        cost += out[i] * out[i]
-    return cost
-
-
-@compiled
-def excess(out: Array) -> float:
-    """Share of the limits and of the last state in the cost of ``out``, from :func:`residuals`.
-
-    It says that a plan cannot be done, or leads nowhere.
-    """
-    total, steps = 0.0, out.shape[0] // PER_STEP
-    for i in range(steps):
-        for j in range(_LIMITS, PER_STEP):
-            total += out[PER_STEP * i + j] ** 2
+def _load(p: PlanProblem, x: Array, i: int) -> None:
+    """Write state and controls of step ``i`` where its stride reads them."""
+    first, k = BLOCK * i, p.reference.stiffness[i]
     for j in range(STATES):
-        total += out[PER_STEP * (steps - 1) + j] ** 2
-    return total
+        p.z[j] = p.start[j] if i == 0 else x[first - STATES + j]
+    for j in range(CONTROLS):
+        p.u[SLOTS[j]] = x[first + j] * (1.0 if j == 0 else k)
 
 
 @compiled
-def knee_moment(p: PlanProblem, plan: Plan, i: int, leg: int) -> tuple[float, float, int]:
+def knee_moment(p: PlanProblem, x: Array, i: int, leg: int) -> tuple[float, float, int]:
     """Moment of a leg's force about its knee, which is half-way up the leg.
 
     M = kappa (l0 - l) sqrt(reach^2 - l^2) / 2, with the larger of the stiffnesses that the leg has
-    before and after. ``leg`` is one of the plan's ``lengths``. Returns M [N m], its derivative by
-    the length [N], and which control the stiffness is.
+    before and after. ``leg`` is one of the problem's ``lengths``. Returns M [N m], its derivative
+    by the length [N], and which control the stiffness is.
     """
-    u, length = plan.controls[i], plan.lengths[i, leg]
-    stiff = 3 if leg != 1 else (1 if u[1] >= u[2] else 2)
-    force = u[stiff] * plan.row[STIFFNESS] * (p.kernel.rest_length - length)
-    arm = 0.5 * np.sqrt(max(p.knee_reach**2 - length**2, 1e-6 * p.knee_reach**2))
-    by_length = -u[stiff] * plan.row[STIFFNESS] * arm - 0.25 * force * length / arm
-    return force * arm, by_length, stiff
+    first, length, k = BLOCK * i, p.lengths[i, leg], p.reference.stiffness[i]
+    before, stiff = (3, 1, 1, 1, 2)[leg], (3, 2, 3, 1, 2)[leg]
+    if x[first + before] > x[first + stiff]:
+        stiff = before
+    kappa, reach = x[first + stiff] * k, p.costs.knee_reach
+    force = kappa * (p.costs.kernel.rest_length - length)
+    arm = 0.5 * np.sqrt(max(reach**2 - length**2, 1e-6 * reach**2))
+    return force * arm, -kappa * arm - 0.25 * force * length / arm, stiff
 
 
 @compiled
-def _chain(
-    jacobian: Array, first: int, skip: int, plan: Plan, i: int, state: Array, out: Array
-) -> None:
-    """Derivatives of three results of step ``i`` by the controls of all steps up to it.
+def landing_height(p: PlanProblem, x: Array, i: int) -> tuple[float, float, float]:
+    """Height at which a foot lands above that of the CoM at the earliest time for it [m].
 
-    ``jacobian`` is the step's, by its state, of ``skip`` columns (0: it is what it is), and its
-    controls; the results' places begin at ``first``; ``state`` (3, c) are the derivatives of the
-    step's own state; ``out`` (3, c) is overwritten.
+    That is l0 sin(alpha) - y(t), of which y comes from its Taylor series at VLO to the second
+    order. The step is loaded. Returns also its derivatives by y and by kappa_1.
     """
-    for a in range(3):
-        for c in range(CONTROLS * i):
-            total = 0.0
-            for b in range(skip):
-                total += jacobian[first + a, b] * state[b, c]
-            out[a, c] = total
-        for c in range(CONTROLS):
-            unit = 1.0 if c == 0 else plan.row[STIFFNESS]
-            out[a, CONTROLS * i + c] = jacobian[first + a, skip + c] * unit
+    c, kernel = p.costs, p.costs.kernel
+    share = 0.5 * c.earliest**2 / kernel.mass
+    kappa, short = x[BLOCK * i + 1] * p.reference.stiffness[i], kernel.rest_length - p.z[1]
+    fall = share * (kappa * short - kernel.mass * kernel.gravity)
+    later = p.z[1] + c.earliest * p.z[2] + fall
+    landing = kernel.rest_length * np.sin(x[BLOCK * i])
+    return landing - later, share * kappa - 1.0, -share * short
 
 
-@compiled
-def slopes(p: PlanProblem, work: MapWorkspace, plan: Plan, rows: Array) -> None:
-    """Write the derivatives of :func:`residuals` by all controls into ``rows`` (11 N, 4 N)."""
-    steps, factor = plan.controls.shape[0], plan.factor
-    size = CONTROLS * steps
-    u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
-    by_control = np.empty((RESULTS, CONTROLS))
-    by_both = np.empty((RESULTS, STATES + CONTROLS))
-    state, following = np.zeros((STATES, size)), np.zeros((STATES, size))
-    lengths = np.zeros((_KNEES, size))
-    for i in range(PER_STEP * steps):
-        for j in range(size):
-            rows[i, j] = 0.0
-    for i in range(steps):
-        slots_of(plan, i, u)
-        # The present state is what it is.
-        skip, columns, jacobian = STATES, p.columns, by_both
-        if i == 0:
-            skip, columns, jacobian = 0, p.columns[STATES:], by_control
-        found = Derivatives(result, jacobian)
-        section_jacobian(p.kernel, EXACT, plan.states[i], u, columns, work, found)
-        _chain(found.jacobian, 0, skip, plan, i, state, following)
-        _chain(found.jacobian, REAR_BOTTOM, skip, plan, i, state, lengths)
-        row = PER_STEP * i
-        beyond = abs(plan.states[i + 1, 2]) > p.rise[0]
-        sign = 1.0 if plan.states[i + 1, 2] > 0.0 else -1.0
-        for c in range(CONTROLS * (i + 1)):
-            for a in range(STATES):
-                state[a, c] = following[a, c]
-            for a in range(STATES):
-                if i < steps - 1:
-                    rows[row + a, c] = state[a, c] / p.tolerance[a]
-                else:
-                    for k in range(a, STATES):
-                        rows[row + a, c] += factor[k, a] * state[k, c]
-            if beyond:
-                rows[row + _LIMITS, c] = sign * state[2, c] / p.rise[1]
-        for c in range(CONTROLS):
-            rows[row + STATES + c, CONTROLS * i + c] = 1.0 / (p.ease * CONTROL_TOLERANCE[c])
-        for leg in range(_KNEES):
-            moment, by_length, stiff = knee_moment(p, plan, i, leg)
-            if moment <= p.knee_moment:
-                continue
-            unit = _KNEE_TOLERANCE * p.knee_moment
-            for c in range(CONTROLS * (i + 1)):
-                rows[row + _LIMITS + 1 + leg, c] = by_length * lengths[leg, c] / unit
-            stiffer = moment / plan.controls[i, stiff]
-            rows[row + _LIMITS + 1 + leg, CONTROLS * i + stiff] += stiffer / unit
+@inner_by_type(evaluate)
+def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
+    """:func:`~.least_squares.evaluate` of a :class:`PlanProblem`."""
 
-
-@compiled
-def _step(p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, i: int) -> bool:
-    """Write the state after step ``i``; False where the template does not complete it."""
-    u, result = np.empty(NUM_SLOTS), np.empty(RESULTS)
-    slots_of(plan, i, u)
-    if one_stride(p.kernel, EXACT, plan.states[i], u, work.scratch, result) != 0:
-        return False
-    for j in range(STATES):
-        plan.states[i + 1, j] = result[j] + aim.offset[j]
-    for j in range(_KNEES):
-        plan.lengths[i, j] = result[REAR_BOTTOM + j]
-    return True
-
-
-@compiled
-def _roll(p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan) -> bool:
-    """Write the plan's states; False where the template does not complete a step."""
-    done = True
-    for i in range(plan.controls.shape[0]):
-        done = done and _step(p, work, aim, plan, i)
-    return done
-
-
-@compiled
-def _bounds(
-    p: PlanProblem, aim: PlanTarget, plan: Plan, i: int, lower: Array, upper: Array
-) -> None:
-    """Bounds of the controls of step ``i`` into their places in (4 N,) arrays."""
-    first = CONTROLS * i
-    for j in range(CONTROLS):
-        middle = plan.row[CONTROL] if j == 0 else 0.0
-        lower[first + j] = middle + BOUNDS[0, j]
-        upper[first + j] = middle + BOUNDS[1, j]
-    if i == 0:
-        lower[0] = min(max(lower[0], aim.angles[0]), upper[0])
-        upper[0] = max(min(upper[0], aim.angles[1]), lower[0])
-    body = p.kernel.rest_length, p.kernel.mass, p.kernel.gravity
-    top = steepest(plan.states[i], body, plan.row[STIFFNESS], p.earliest)
-    upper[first] = min(upper[first], top)
-    lower[first] = min(lower[first], upper[first])
-
-
-@compiled
-def _guess(
-    p: PlanProblem, work: MapWorkspace, aim: PlanTarget, plan: Plan, feedback: float
-) -> bool:
-    """A plan to begin with: ``feedback`` of the LQR's on top of the aimed gait's controls.
-
-    False where the template does not complete a step.
-    """
-    target, size = plan.target, CONTROLS * plan.controls.shape[0]
-    lower, upper = np.empty(size), np.empty(size)
-    for i in range(plan.controls.shape[0]):
-        _bounds(p, aim, plan, i, lower, upper)
-        for j in range(CONTROLS):
-            wish = target[STATES + j]
-            for k in range(STATES):
-                gain = plan.row[GAIN + STATES * j + k]
-                wish -= feedback * gain * (plan.states[i, k] - target[k])
-            place = CONTROLS * i + j
-            plan.controls[i, j] = min(max(wish, lower[place]), upper[place])
-        if not _step(p, work, aim, plan, i):
-            return False
-    return True
-
-
-@compiled
-def look_ahead(
-    p: PlanProblem, work: MapWorkspace, z: Array, aim: PlanTarget, plan: Plan
-) -> tuple[float, float]:
-    """Plan N steps from a VLO state ``z`` (3,) [m/s, m, m/s]; ``plan`` is overwritten.
-
-    Returns the plan's cost and its :func:`excess`, inf where the template completes no steps to
-    begin with.
-    """
-    steps = plan.controls.shape[0]
-    size = CONTROLS * steps
-    _aimed(p, aim, plan)
-    for j in range(STATES):
-        plan.states[0, j] = z[j]
-    feedback = 1.0
-    while not _guess(p, work, aim, plan, feedback):
-        if feedback == 0.0:
-            return np.inf, np.inf
-        feedback = max(feedback - _LESS, 0.0)
-    lower, upper = np.empty(size), np.empty(size)
-    rows, residual = np.empty((PER_STEP * steps, size)), np.empty(PER_STEP * steps)
-    start, x = np.empty(size), np.empty(size)
-    free = plan.controls.reshape(size)
-    cost = residuals(p, plan, residual)
-    for _ in range(p.rounds):
-        slopes(p, work, plan, rows)
+    def at(problem: Any, x: Any, residual: Any) -> Any:
+        p, c, reference = problem, problem.costs, problem.reference
+        steps, total = p.ends.shape[0], 0.0
         for i in range(steps):
-            _bounds(p, aim, plan, i, lower, upper)
-        for i in range(size):
-            start[i] = free[i]
-            x[i] = min(max(start[i], lower[i]), upper[i])
-        for r in range(residual.shape[0]):
-            for i in range(size):
-                residual[r] += rows[r, i] * (x[i] - start[i])
-        there = bounded_step(rows, residual, x, lower, upper, 0.0)
-        lowered = np.inf
-        for share in _SHARES:
-            for i in range(size):
-                free[i] = start[i] + share * (there[i] - start[i])
-            if _roll(p, work, aim, plan):
-                lowered = residuals(p, plan, residual)
-                if lowered < cost:
-                    break
-        saved, cost = cost - lowered, min(cost, lowered)
-        if saved < _DONE * max(cost, 1.0):
-            break
-    return cost, excess(residual)
+            first, row, last = BLOCK * i, PER_STEP * i, i == steps - 1
+            _load(p, x, i)
+            if one_stride(c.kernel, EXACT, p.z, p.u, p.work.scratch, p.result) != 0:
+                return np.inf
+            for j in range(STATES):
+                p.ends[i, j] = p.result[j] + p.offset[j]
+            for j in range(3):
+                p.lengths[i, j] = p.result[REAR_BOTTOM + j]
+            p.lengths[i, 3], p.lengths[i, 4] = p.z[1], p.ends[i, 1]
+            for j in range(STATES):
+                residual[row + j] = residual[row + _STATE + j] = 0.0
+                if last:
+                    for k in range(j, STATES):
+                        residual[row + j] += reference.factor[k, j] * (
+                            p.ends[i, k] - reference.end[k]
+                        )
+                else:
+                    z = x[first + CONTROLS + j]
+                    residual[row + j] = (p.ends[i, j] - z) / c.defect[j]
+                    residual[row + _STATE + j] = (z - reference.states[i, j]) / c.tolerance[j]
+            for j in range(CONTROLS):
+                miss = x[first + j] - reference.controls[i, j]
+                residual[row + _CONTROL + j] = miss / c.control_tolerance[j]
+            beyond = abs(p.ends[i, 2]) - c.rise[0]
+            residual[row + _RISE] = max(beyond, 0.0) / c.rise[1]
+            for leg in range(_KNEES):
+                beyond = knee_moment(p, x, i, leg)[0] / c.knee_moment - 1.0
+                residual[row + _KNEE + leg] = max(beyond, 0.0) / _KNEE_TOLERANCE
+            soon = landing_height(p, x, i)[0] / (_SOON_TOLERANCE * c.kernel.rest_length)
+            residual[row + _SOON] = max(soon, 0.0)
+        for r in range(PER_STEP * steps):
+            total += residual[r] * residual[r]
+        return total
+
+    return at if of_type(problem, PlanProblem) else None
+
+
+@inner_by_type(slopes)
+def _plan_slopes(problem: Any, x: Any, rows: Any) -> Any:
+    """:func:`~.least_squares.slopes` of a :class:`PlanProblem`."""
+
+    def at(problem: Any, x: Any, rows: Any) -> Any:
+        p, c, reference = problem, problem.costs, problem.reference
+        found, steps = Derivatives(p.result, p.jacobian), p.ends.shape[0]
+        for r in range(rows.shape[0]):
+            for j in range(rows.shape[1]):
+                rows[r, j] = 0.0
+        for i in range(steps):
+            first, row, last = BLOCK * i, PER_STEP * i, i == steps - 1
+            _load(p, x, i)
+            section_jacobian(c.kernel, EXACT, p.z, p.u, c.columns, p.work, found)
+            rising = 1.0 if p.ends[i, 2] > 0.0 else -1.0
+            # The present state is what it is.
+            for column in range(STATES if i == 0 else 0, BLOCK):
+                place = first - STATES + column
+                unit = reference.stiffness[i] if column > STATES else 1.0
+                for j in range(STATES):
+                    if last:
+                        for k in range(j, STATES):
+                            slope = reference.factor[k, j] * p.jacobian[k, column]
+                            rows[row + j, place] += slope * unit
+                    else:
+                        rows[row + j, place] = p.jacobian[j, column] * unit / c.defect[j]
+                if abs(p.ends[i, 2]) > c.rise[0]:
+                    rows[row + _RISE, place] = rising * p.jacobian[2, column] * unit / c.rise[1]
+                for leg in range(_KNEES):
+                    moment, by_length, stiff = knee_moment(p, x, i, leg)
+                    if moment <= c.knee_moment:
+                        continue
+                    if leg < 3:
+                        slope = by_length * p.jacobian[REAR_BOTTOM + leg, column] * unit
+                    elif leg == 3:
+                        slope = by_length if column == 1 else 0.0
+                    else:
+                        slope = by_length * p.jacobian[1, column] * unit
+                    if column == STATES + stiff:
+                        slope += moment / x[first + stiff]
+                    rows[row + _KNEE + leg, place] = slope / (_KNEE_TOLERANCE * c.knee_moment)
+            height, by_height, by_kappa = landing_height(p, x, i)
+            if height > 0.0:
+                length = c.kernel.rest_length
+                soon = _SOON_TOLERANCE * length
+                rows[row + _SOON, first] = length * np.cos(x[first]) / soon
+                rows[row + _SOON, first + 1] = by_kappa * reference.stiffness[i] / soon
+                if i > 0:
+                    rows[row + _SOON, first - 2] = by_height / soon
+                    rows[row + _SOON, first - 1] = -c.earliest / soon
+            for j in range(CONTROLS):
+                rows[row + _CONTROL + j, first + j] = 1.0 / c.control_tolerance[j]
+            if not last:
+                for j in range(STATES):
+                    place = first + CONTROLS + j
+                    rows[row + j, place] = -1.0 / c.defect[j]
+                    rows[row + _STATE + j, place] = 1.0 / c.tolerance[j]
+
+    return at if of_type(problem, PlanProblem) else None
+
+
+@compiled
+def begin(p: PlanProblem, angles: tuple[float, float], x: Array) -> None:
+    """Write the bounds of all controls, and the reference's steps within them into ``x``.
+
+    ``angles`` are the least and the greatest touchdown angle of the first step [rad].
+    """
+    c, reference, steps = p.costs, p.reference, p.ends.shape[0]
+    body = c.kernel.rest_length, c.kernel.mass, c.kernel.gravity
+    for i in range(steps):
+        first, k = BLOCK * i, reference.stiffness[i]
+        for j in range(CONTROLS):
+            middle = reference.controls[i, 0] if j == 0 else 0.0
+            p.lower[first + j] = middle + BOUNDS[0, j]
+            p.upper[first + j] = middle + BOUNDS[1, j]
+        if i == 0:
+            p.lower[0] = min(max(p.lower[0], angles[0]), p.upper[0])
+            p.upper[0] = max(min(p.upper[0], angles[1]), p.lower[0])
+        z = p.start if i == 0 else reference.states[i - 1]
+        p.upper[first] = min(p.upper[first], steepest(z, body, k, 0.0))
+        p.lower[first] = min(p.lower[first], p.upper[first])
+        for j in range(CONTROLS):
+            wish = reference.controls[i, j]
+            x[first + j] = min(max(wish, p.lower[first + j]), p.upper[first + j])
+        for j in range(STATES if i < steps - 1 else 0):
+            x[first + CONTROLS + j] = reference.states[i, j]
+
+
+@compiled
+def look_ahead(problem: PlanProblem, search: Search, x: Array) -> tuple[float, float]:
+    """Plan N steps from ``x`` (7 N - 3,) on, each step's controls and the state after it.
+
+    Returns the plan's cost, and the share of it that says that the plan cannot be done, or leads
+    nowhere: of the defects, the limits and the last state. Both are inf where the template does not
+    complete the steps that the search begins with.
+    """
+    residual, excess = np.empty(PER_STEP * problem.ends.shape[0]), 0.0
+    cost = least_squares(problem, search, residual.shape[0], x)
+    if cost == np.inf:
+        return np.inf, np.inf
+    evaluate(problem, x, residual)
+    for r in range(residual.shape[0]):
+        if not _STATE <= r % PER_STEP < _RISE:
+            excess += residual[r] * residual[r]
+    return cost, excess
+
+
+@compiled
+def roughness(p: PlanProblem, x: Array, i: int) -> float:
+    """Largest error of a step's linear map over small changes of its state, in tolerances.
+
+    Where a leg nearly lifts off, or lands, a little earlier than it does, other states lead
+    elsewhere: there the error is large, or inf where the template completes no step.
+    """
+    c, worst, end = p.costs, 0.0, np.empty(STATES)
+    _load(p, x, i)
+    section_jacobian(
+        c.kernel, EXACT, p.z, p.u, c.columns, p.work, Derivatives(p.result, p.jacobian)
+    )
+    for j in range(STATES):
+        end[j] = p.result[j]
+    for k in range(STATES):
+        at = p.z[k]
+        for side in range(2):
+            change = (1.0 - 2.0 * side) * p.small[k]
+            p.z[k] = at + change
+            outcome = one_stride(c.kernel, EXACT, p.z, p.u, p.work.scratch, p.result)
+            p.z[k] = at
+            if outcome != 0:
+                return np.inf
+            for j in range(STATES):
+                miss = p.result[j] - end[j] - p.jacobian[j, k] * change
+                worst = max(worst, abs(miss) / p.usual[j])
+    return worst

@@ -27,6 +27,8 @@ class Search(NamedTuple):
     close: float = 0.03  # the last step's length in units of change: what it leaves is its square
     grid: int = 5  # points of each unknown that are tried where the start fails; 0: none
     save: float = 0.0  # share of the cost that a step has to save for another one
+    # Damping after a bad step. Where equations weigh more than wishes, less of it stops the latter.
+    damping: float = 1.0
     # Steps that may raise the cost, before they are taken back. Where targets are met by a curved
     # valley of unknowns, Newton's method leaves it and finds its end; with a cost that always falls
     # it creeps along.
@@ -182,11 +184,11 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
             if done > _GOOD:
                 damping = _LESS * damping if damping > _LESS else 0.0
             elif done < _BAD:
-                damping = max(damping / _LESS, 1.0)
+                damping = max(damping / _LESS, search.damping)
         elif patience > 0 and cost < np.inf:
             patience -= 1
         elif not last:
-            damping = max(damping / _LESS, 1.0)
+            damping = max(damping / _LESS, search.damping)
             _copy(best, here)
             continue
         if known and last:

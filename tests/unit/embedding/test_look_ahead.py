@@ -1,4 +1,4 @@
-"""The planner that looks several steps ahead: its derivatives, its bounds and its governor."""
+"""The planner that looks several steps ahead: its plans, their limits, and its governor."""
 
 import json
 from dataclasses import replace
@@ -13,42 +13,53 @@ from template_control.embedding.planners.ahead import (
     SPACING,
     AheadOptions,
     AheadPlanner,
+    WalkLimits,
     check_feasibility,
-    plan_problem,
+    plan_costs,
 )
 from template_control.embedding.planners.gait_table import (
     CONTROL,
+    CONTROLS,
+    COST,
+    SETTLING,
     SLOTS,
     STATE,
+    STATE_TOLERANCE,
     STIFFNESS,
     gait_table,
     row_at,
 )
 from template_control.embedding.planners.look_ahead import (
+    BLOCK,
     BOUNDS,
-    PER_STEP,
-    PlanTarget,
+    SEARCH,
+    SMALL,
+    STATES,
+    begin,
     knee_moment,
     look_ahead,
-    new_plan,
-    residuals,
-    slopes,
+    new_problem,
+    roughness,
 )
+from template_control.embedding.planners.lqr import KNEE_MOMENT
 from template_control.embedding.planners.planner import ANY_ANGLE, Cause, Context
 from template_control.embedding.planners.step_search import TOP_MARGIN
+from template_control.embedding.robot_template import walk_limits
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome
+from template_control.slip.control.least_squares import Search
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
-from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap, new_workspace
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
 
 P = tc.SlipParameters()
 OPTIONS = AheadOptions()
+KNEES = KNEE_MOMENT * P.mass * P.gravity  # [N m], l0 = 1 m
 SCENARIO = """
 start = [0.4, 0.977, 0.0]
 [[segment]]
@@ -65,51 +76,83 @@ def planner():
 
 
 def table():
-    """Of the planner's gaits; whoever asks first waits a second for it."""
+    """Of the planner's gaits; the first user waits a second for it."""
     return gait_table(P)
 
 
-def plan_from(z, speed, steps=3, **changes):
-    """A plan's cost, the plan, and what it was made with."""
-    known = plan_problem(P, table())._replace(**changes)
-    plan, work = new_plan(steps), new_workspace()
-    aim = PlanTarget(speed, np.zeros(3), ANY_ANGLE)
-    cost, _ = look_ahead(known, work, z, aim, plan)
-    return cost, plan, (known, work, aim)
+def problem_from(z, speed, steps=3, **changes):
+    """A plan that is to be near a gait, and its start."""
+    p = new_problem(plan_costs(P, OPTIONS, KNEES)._replace(**changes), steps)
+    row = row_at(table(), speed)
+    p.start[:], p.offset[:] = z, 0.0
+    r = p.reference
+    r.states[:], r.end[:] = row[STATE:CONTROL], row[STATE:CONTROL]
+    r.controls[:], r.stiffness[:] = row[CONTROL : CONTROL + CONTROLS], row[STIFFNESS]
+    r.factor[:] = np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))
+    x = np.empty(BLOCK * steps - STATES)
+    begin(p, ANY_ANGLE, x)
+    return p, x
+
+
+def plan_from(z, speed, steps=3, search=SEARCH, **changes):
+    """A plan near a gait: its cost and excess, its problem and its unknowns."""
+    p, x = problem_from(z, speed, steps, **changes)
+    cost, excess = look_ahead(p, search, x)
+    return cost, excess, p, x
+
+
+def first_step(p, x):
+    """(6,) controls of a plan's first step."""
+    u = np.zeros(NUM_SLOTS)
+    u[SLOTS] = x[:CONTROLS] * [1.0, *[p.reference.stiffness[0]] * 3]
+    return u
 
 
 @pytest.mark.parametrize("moment", [np.inf, 250.0])
-def test_derivatives_are_those_of_the_residuals(moment):
-    z = row_at(table(), 0.8)[STATE : STATE + 3] + [0.03, 0.002, 0.16]
-    _, plan, (known, work, _) = plan_from(z, 0.9, rounds=1, knee_moment=moment)
-    size = plan.controls.size
-    rows = np.empty((PER_STEP * len(plan.controls), size))
-    slopes(known, work, plan, rows)
-    step = ReturnMap(P, "wp")
+def test_a_plan_is_where_its_cost_is_least(moment):
+    """The derivatives are those of the cost: else Gauss and Newton's method ends elsewhere."""
+    z = row_at(table(), 0.8)[STATE:CONTROL] + [0.03, 0.002, 0.16]
+    fully = Search(rounds=60, close=1e-9, grid=0, damping=1e-3)
+    cost, _, p, x = plan_from(z, 0.9, search=fully, knee_moment=moment)
 
-    def missed(change):
-        states, controls = [plan.states[0]], plan.controls + change.reshape(plan.controls.shape)
-        legs = []
-        for row in controls:
-            u = np.zeros(6)
-            u[SLOTS] = row * [1.0, *[plan.row[STIFFNESS]] * 3]
-            result, _ = step.evaluate(states[-1], u)
-            states.append(result[:3])
-            legs.append(result[REAR_BOTTOM:])
-        out = np.empty(len(rows))
-        states, legs = np.array(states), np.array(legs)
-        residuals(known, plan._replace(states=states, controls=controls, lengths=legs), out)
-        return out
+    def at(y):
+        return look_ahead(p, Search(rounds=0, grid=0), y.copy())[0]
 
-    for column, change in zip(rows.T, 1e-6 * np.eye(size), strict=True):
-        difference = (missed(change) - missed(-change)) / 2e-6
-        np.testing.assert_allclose(column, difference, rtol=1e-4, atol=1e-4 * np.abs(rows).max())
+    assert at(x) == pytest.approx(cost)
+    free = (x > p.lower + 1e-4 * p.change) & (x < p.upper - 1e-4 * p.change)
+    for i in np.flatnonzero(free):
+        change = 1e-4 * p.change[i] * np.eye(len(x))[i]
+        slope = (at(x + change) - at(x - change)) / 2e-4
+        assert abs(slope) < 2e-3 * cost
+    far = x + 0.01 * p.change
+    left = look_ahead(p, Search(rounds=1, grid=0), far.copy())[0] - cost
+    assert left < 0.1 * (at(far) - cost)
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.8, 1.3])
+def test_roughness_is_what_the_linear_map_misses(speed):
+    row, step = row_at(table(), speed), ReturnMap(P, "wp")
+    p, x = problem_from(row[STATE:CONTROL], speed)
+    z, u = p.start.copy(), first_step(p, x)
+    here = step.linearise(z, u)
+    misses = [
+        step.evaluate(z + change, u)[0][:3] - here.state - here.state_jacobian @ change
+        for change in (*np.diag(SMALL), *-np.diag(SMALL))
+    ]
+    expected = np.max(np.abs(misses) / STATE_TOLERANCE)
+    assert roughness(p, x, 0) == pytest.approx(expected, rel=1e-6)
+    assert roughness(p, x, 0) < 2.5
+
+
+def test_a_step_that_another_state_does_not_complete_is_rough():
+    _, _, p, x = plan_from(np.array([0.241, 0.977, 0.105]), 0.24)  # rises out of a slow gait
+    assert roughness(p, x, 0) == np.inf
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.36, 0.8, 1.3])
 def test_a_gait_is_kept(planner, speed):
     row = row_at(table(), speed)
-    z = row[STATE : STATE + 3]
+    z = row[STATE:CONTROL]
     decision = planner.decide(Context(z, z))
     assert decision.accepted is None
     assert decision.nominal
@@ -122,36 +165,35 @@ def test_a_gait_is_kept(planner, speed):
 def test_a_plan_stays_within_its_bounds(seed):
     rng = np.random.default_rng(seed)
     speed = rng.uniform(0.3, 1.2)
-    z = row_at(table(), speed)[STATE : STATE + 3] + rng.uniform(-1, 1, 3) * [0.15, 0.006, 0.15]
-    cost, plan, _ = plan_from(z, speed)
+    z = row_at(table(), speed)[STATE:CONTROL] + rng.uniform(-1, 1, 3) * [0.15, 0.006, 0.15]
+    cost, _, p, x = plan_from(z, speed)
     if not np.isfinite(cost):
         pytest.skip("no plan from there")
+    controls = np.append(x, np.zeros(STATES)).reshape(-1, BLOCK)[:, :CONTROLS]
     low, high = BOUNDS.copy()
-    low[0] += plan.row[CONTROL]
-    high[0] += plan.row[CONTROL]
-    assert np.all(plan.controls >= low - 1e-12)
-    assert np.all(plan.controls <= high + 1e-12)
-    top = np.arcsin(np.minimum(plan.states[0, 1], 1.0))
-    assert plan.controls[0, 0] <= top - TOP_MARGIN + 1e-12
+    low[0] += p.reference.controls[0, 0]
+    high[0] += p.reference.controls[0, 0]
+    assert np.all(controls >= low - 1e-12)
+    assert np.all(controls <= high + 1e-12)
+    assert controls[0, 0] <= np.arcsin(min(z[1], 1.0)) - TOP_MARGIN + 1e-12
 
 
 def test_a_foot_does_not_land_at_once():
     """Slow and sinking at VLO, the CoM would else be at the height of a landing in 0.05 s."""
-    z = row_at(table(), 0.3)[STATE : STATE + 3] + [0.1, 0.0, -0.05]
+    z = row_at(table(), 0.3)[STATE:CONTROL] + [0.1, 0.0, -0.05]
     simulator, node = StrideSimulator(P, AUTOMATON), AUTOMATON.start("wp").name
 
     def lands(**changes):
-        _, plan, _ = plan_from(z, 0.3, **changes)
-        u = np.zeros(NUM_SLOTS)
-        u[SLOTS] = plan.controls[0] * [1.0, *[plan.row[STIFFNESS]] * 3]
-        return simulator.run(node, VLO.state(z), u).time_of(Event.TOUCHDOWN)
+        _, _, p, x = plan_from(z, 0.3, **changes)
+        stride = simulator.run(node, VLO.state(z), first_step(p, x))
+        return stride.time_of(Event.TOUCHDOWN)
 
-    assert lands() < 0.1
+    assert lands(earliest=0.0) < 0.1
     assert lands(earliest=0.12) > 0.11
 
 
 def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
-    z = row_at(table(), 0.9)[STATE : STATE + 3]
+    z = row_at(table(), 0.9)[STATE:CONTROL]
     free = planner.decide(Context(z, z + [0.1, 0.0, 0.0]))
     angle = free.controls[0] + 0.01
     held = planner.decide(Context(z, z + [0.1, 0.0, 0.0], (angle, angle + 1e-9)))
@@ -159,62 +201,118 @@ def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
 
 
 def test_dy_dt_costs_above_its_bound():
-    z = row_at(table(), 0.9)[STATE : STATE + 3]
-    below, *_ = plan_from(z + [0.0, 0.0, 0.1], 0.9, rounds=1)
-    calm, plan, _ = plan_from(z + [0.0, 0.0, 0.1], 0.9)
-    assert calm <= below
-    assert np.abs(plan.states[1:, 2]).max() < sum(RISE)
+    z = row_at(table(), 0.9)[STATE:CONTROL] + [0.0, 0.0, 0.1]
+    begun, *_ = plan_from(z, 0.9, search=Search(rounds=1, grid=0))
+    calm, _, p, _ = plan_from(z, 0.9)
+    assert calm <= begun
+    assert np.abs(p.ends[:, 2]).max() < sum(RISE)
 
 
 @pytest.mark.parametrize("faster", [0.15, -0.15])
 def test_a_plan_keeps_to_what_the_knees_bear(faster):
-    z = row_at(table(), 0.8)[STATE : STATE + 3]
+    z = row_at(table(), 0.8)[STATE:CONTROL]
 
     def largest(limit):
-        _, plan, (known, *_) = plan_from(z, 0.8 + faster, knee_moment=limit)
-        legs = [(i, leg) for i in range(len(plan.lengths)) for leg in range(3)]
-        return max(knee_moment(known, plan, i, leg)[0] for i, leg in legs)
+        _, _, p, x = plan_from(z, 0.8 + faster, knee_moment=limit)
+        return max(knee_moment(p, x, i, leg)[0] for i in range(3) for leg in range(5))
 
     free = largest(np.inf)
     limit = 0.9 * free
     assert largest(limit) - limit < 0.6 * (free - limit)  # the limit is soft
 
 
-def test_what_cannot_be_done_is_told_from_what_is_dear():
+def test_the_knees_bear_the_leg_force_at_vlo_too():
+    """Legs 3 and 4 are the stance legs before and after; the arm is that of equal links."""
+    z = row_at(table(), 0.8)[STATE:CONTROL] - [0.0, 0.03, 0.0]
+    _, _, p, x = plan_from(z, 0.8)
+    k, (_, front, _, _) = p.reference.stiffness[0], x[:CONTROLS]
+    arm = 0.5 * np.sqrt(p.costs.knee_reach**2 - z[1] ** 2)
+    force = front * k * (P.rest_length - z[1])
+    moment, by_length, _ = knee_moment(p, x, 0, 3)
+    assert moment == pytest.approx(force * arm)
+    p.lengths[0, 3] += 1e-6
+    assert knee_moment(p, x, 0, 3)[0] - moment == pytest.approx(1e-6 * by_length, rel=1e-4)
+    assert p.lengths[0, 4] == pytest.approx(p.ends[0, 1])
+
+
+def test_what_cannot_be_done_is_apart_from_what_is_dear():
     """A change of all controls costs, and exceeds nothing."""
-    z = row_at(table(), 0.8)[STATE : STATE + 3]
-    cost, plan, (known, work, aim) = plan_from(z, 0.9)
-    _, excess = look_ahead(known, work, z, aim, plan)
+    z = row_at(table(), 0.8)[STATE:CONTROL]
+    cost, excess, *_ = plan_from(z, 0.9)
     assert excess < 0.5 * cost
-    weak = known._replace(knee_moment=0.3 * known.knee_moment)
-    assert look_ahead(weak, work, z, aim, plan)[1] > OPTIONS.cheap
+    assert plan_from(z, 0.9, knee_moment=0.3 * KNEES)[1] > OPTIONS.cheap
 
 
-def test_a_small_change_is_taken_and_a_large_one_reduced(planner):
-    z = row_at(table(), 0.9)[STATE : STATE + 3]
-    taken = planner.decide(Context(z, z + [0.05, 0.0, 0.0]))
+@pytest.fixture(scope="module")
+def governed():
+    """Without a table of changes: a large change of the speed is reduced."""
+    return AheadPlanner(P, AheadOptions(changes=0))
+
+
+def test_a_small_change_is_taken_and_a_large_one_reduced(governed):
+    z = row_at(table(), 0.9)[STATE:CONTROL]
+    taken = governed.decide(Context(z, z + [0.05, 0.0, 0.0]))
     assert taken.accepted is None
-    reduced = planner.decide(Context(z, z + [0.5, 0.0, 0.0]))
+    reduced = governed.decide(Context(z, z + [0.5, 0.0, 0.0]))
     assert 0.9 < reduced.accepted <= 0.9 + OPTIONS.pace
     assert 0.9 < reduced.predicted[0] < reduced.accepted
-    assert planner.gait.vlo[0] == pytest.approx(reduced.accepted)
+    assert governed.gait.vlo[0] == pytest.approx(reduced.accepted)
+
+
+@pytest.mark.parametrize("wanted", [0.22, 0.5, 1.37])
+def test_slower_and_faster_gaits_than_the_table_s_are_reached(planner, wanted):
+    step, z = ReturnMap(P, "wp"), row_at(table(), 0.9)[STATE:CONTROL]
+    for _ in range(12):
+        z, _ = step.step(z, planner.decide(Context(z, np.array([wanted, 0.0, 0.0]))).controls)
+    assert planner.gait.vlo[0] == pytest.approx(wanted)
+    assert np.all(np.abs(z - planner.gait.vlo) < [0.02, 0.003, 0.02])
+
+
+@pytest.mark.parametrize(("speed", "wanted"), [(0.35, 1.25), (1.25, 0.35), (0.7, 1.1)])
+def test_any_speed_is_reached_in_a_few_steps(planner, speed, wanted):
+    step, z = ReturnMap(P, "wp"), row_at(table(), speed)[STATE:CONTROL]
+    for _ in range(8):
+        decision = planner.decide(Context(z, np.array([wanted, 0.0, 0.0])))
+        assert decision.nominal
+        assert planner.gait.vlo[0] == pytest.approx(wanted)
+        z, _ = step.step(z, decision.controls)
+        np.testing.assert_allclose(z, decision.predicted, atol=1e-9)
+        assert decision.accepted in (None, z[0])
+    assert decision.accepted is None
+    assert np.all(np.abs(z - planner.gait.vlo) < [0.02, 0.003, 0.02])
+
+
+def test_a_robot_s_limits_count():
+    """Of its knees, and of its range: the nearest speed in it is aimed at."""
+    z = row_at(table(), 0.8)[STATE:CONTROL]
+    held = AheadPlanner(P, limits=WalkLimits(KNEES, (0.6, 0.9)))
+    for wanted, aim in [(0.3, 0.6), (1.2, 0.9), (0.7, 0.7)]:
+        held.decide(Context(z, np.array([wanted, 0.0, 0.0])))
+        assert held.gait.vlo[0] == pytest.approx(aim)
+    robots = {name: walk_limits(tc.load_robot(name)) for name in ("five-link", "human", "rabbit")}
+    assert robots["five-link"].knee_moment == pytest.approx(KNEES)
+    limit = tc.load_robot("human").torque_limit[1]
+    assert 0.9 * limit < robots["human"].knee_moment < limit
+    template = tc.template_for(tc.load_robot("rabbit"))
+    slowest, fastest = walking_by_speed().range(template)
+    assert slowest < robots["rabbit"].speeds[0] < robots["rabbit"].speeds[1] < fastest
 
 
 @pytest.mark.parametrize("cause", [Cause.TOUCHDOWN, Cause.DEVIATION])
-def test_a_step_goes_on_to_where_it_went(planner, cause):
-    z = row_at(table(), 0.9)[STATE : STATE + 3]
+def test_a_step_goes_on_to_where_it_went(governed, cause):
+    z = row_at(table(), 0.9)[STATE:CONTROL]
     wanted, seems = z - [0.5, 0.0, 0.0], z + [0.04, 0.0, 0.0]
-    began = planner.decide(Context(z, wanted))
-    planner.decide(Context(began.predicted, wanted, cause=Cause.FUTURE))
-    goes_on = planner.decide(Context(seems, wanted, cause=cause, decision=began))
+    began = governed.decide(Context(z, wanted))
+    governed.decide(Context(began.predicted, wanted, cause=Cause.FUTURE))
+    goes_on = governed.decide(Context(seems, wanted, cause=cause, decision=began))
     assert goes_on.accepted == began.accepted
-    assert planner.decide(Context(seems, wanted)).accepted > began.accepted
+    assert governed.decide(Context(seems, wanted)).accepted > began.accepted
 
 
 @pytest.mark.parametrize(("wanted", "end"), [(0.02, 0), (3.0, 1)])
 def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
     there = planner.speeds[end]
-    z = row_at(table(), there)[STATE : STATE + 3]
+    z = row_at(table(), there)[STATE:CONTROL]
     decision = planner.decide(Context(z, np.array([wanted, z[1], 0.0])))
     assert decision.accepted == pytest.approx(there)
 
@@ -222,7 +320,7 @@ def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
 @pytest.mark.slow(seconds=2)
 def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
     hasty = AheadPlanner(P, AheadOptions(cheap=1e-9))
-    z = row_at(table(), 0.9)[STATE : STATE + 3] + [0.1, 0.0, 0.0]
+    z = row_at(table(), 0.9)[STATE:CONTROL] + [0.1, 0.0, 0.0]
     decision = hasty.decide(Context(z, z))
     assert decision.feasible
     assert decision.lasting
