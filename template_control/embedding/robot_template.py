@@ -276,7 +276,14 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
 
 
 def walk_limits(robot: Biped) -> WalkLimits:
-    """Limits of the walks that are planned for a robot."""
+    """Limits of the walks that are planned several steps ahead for a robot.
+
+    The knees bear a share of their torque limit, and at most what five-link's do for its weight;
+    the speeds are those of :func:`walking_speeds`, or of the family where the robot has none.
+
+    Args:
+        robot: its last update is overwritten.
+    """
     p = template_for(robot)
     torque = min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
     moment = _BORNE * torque * len(robot.groups[0])  # knees that bend together

@@ -50,18 +50,16 @@ from template_control.slip.similarity import REFERENCE
 
 SPEEDS = (0.26, 0.326, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.317)
 """dx/dt at VLO of the gaits that are led from and to [m/s]."""
-_SLOWEST = 0.3  # of the gaits that a change of the library leads to: slower ones are rough
+_SLOWEST = 0.3  # speed that a change of the library leads to [m/s]: slower gaits are rough
 MOST = 7
 """Steps of a change at most."""
 _KNEE = 320.0  # moment that a knee bears [N m]
 _RISE = (0.15, 0.01)  # |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s]
 _EARLIEST = 0.1  # touchdown after VLO [s]: the swing leg passes the other one about then
 _DEFECT = 0.3  # differences between the steps, over those of a plan
-_TOLERANCE = np.array(
-    [32.0, 1.0, 6.0]
-)  # from the aimed speed, the gaits' height, level: they cost 1
-# The same of the speed in a first search, whose steps begin the second.
-_HASTE = (1.0, 0.3)
+# Differences from the aimed speed, the gaits' height and level that cost 1.
+_TOLERANCE = np.array([32.0, 1.0, 6.0])
+_HASTE = (1.0, 0.3)  # the same of the speed in a first search, whose steps begin the second [m/s]
 _FREE = np.array([3.2, 12.0, 12.0, 12.0])  # changes of alpha [rad] and of the shares that cost 1
 _SEARCH = Search(rounds=60, close=1e-4, grid=0, save=1e-4, damping=1e-3)
 _TRIES = 30  # random steps that a change is sought from
@@ -69,7 +67,7 @@ _SPREAD = np.array([0.04, 0.15, 0.15, 0.15, 0.08, 0.006, 0.05])  # their standar
 _STITCHED = 12  # steps of two other changes that one is sought from
 _DONE = 0.05  # excess of a change that can be done
 _SMOOTH = 1.0  # roughness of its steps at most
-_PASSES = 6  # over all pairs at most, from their neighbours
+_PASSES = 6  # over all pairs at most, from steps of other changes
 _LONGER = 2  # steps more than the fewest that are tried
 _SOONER = 0.98  # of a change's delay: less is no gain
 
