@@ -16,7 +16,7 @@ from template_control.checks.ranges import Angle, Positive
 from template_control.embedding.free.options import SOLE_STAND
 from template_control.embedding.planners.ahead import WalkLimits
 from template_control.embedding.planners.gait_table import STATE, gait_table, row_at
-from template_control.embedding.planners.lqr import KNEE_MOMENT
+from template_control.embedding.planners.lqr import usual_knee_moment
 from template_control.embedding.planners.running import AGILE
 from template_control.embedding.standing.curves import StandingOptions
 from template_control.errors import GaitError, ScenarioError
@@ -287,13 +287,12 @@ def walk_limits(robot: Biped) -> WalkLimits:
     p = template_for(robot)
     torque = min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
     moment = _BORNE * torque * len(robot.groups[0])  # knees that bend together
-    usual = KNEE_MOMENT * p.rest_length / REFERENCE.rest_length * p.mass * p.gravity
     try:
         speeds = walking_speeds(robot)
     except GaitError:
         speeds = family_speeds(p)
     slowest, fastest = (float(gait_for_speed(p, speed).vlo[0]) for speed in speeds)
-    return WalkLimits(min(moment, usual), (slowest, fastest), not _heavy(robot))
+    return WalkLimits(min(moment, usual_knee_moment(p)), (slowest, fastest), not _heavy(robot))
 
 
 def _shortest_leg(gait: RunningGait) -> float:

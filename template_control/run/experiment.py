@@ -304,20 +304,20 @@ class Experiment(Checked):
         if isinstance(motion, Scenario):
             push_off = None if isinstance(planner, Mapping) else _pushes_off(planner)
             motion = robot_route(robot, motion, push_off)
-        if planner is None and isinstance(motion, SpeedRoute):
+        any_speed = isinstance(motion, SpeedRoute) or (
+            isinstance(motion, ScenarioRoute) and motion.pushes_off
+        )
+        if planner is None and any_speed:
             planner = self.tuning.planning.ahead
-        standing, limits = standing_options(robot), walk_limits(robot)
-        if planner is None:
-            return motion, default_planners(motion, standing=standing, limits=limits)
         if isinstance(planner, Mapping):
             return motion, planner
         if isinstance(planner, AheadOptions):
-            speed = first_speed(motion)
+            speed, limits = first_speed(motion), walk_limits(robot)
             planner = AheadPlanner(motion.parameters, planner, speed, limits=limits)
         elif isinstance(planner, _SPECS):
             gait = walking_gait(motion.parameters, first_speed(motion))
             planner = _planner(planner, gait, robot)
-        return motion, default_planners(motion, planner, standing=standing)
+        return motion, default_planners(motion, planner, standing=standing_options(robot))
 
     @checked
     def save(self, path: str | Path) -> Path:

@@ -42,10 +42,10 @@ from template_control.embedding.planners.look_ahead import (
     roughness,
 )
 from template_control.embedding.planners.lqr import (
-    KNEE_MOMENT,
     KNEE_STRAIGHT,
     WALK,
     LqrPlanner,
+    usual_knee_moment,
 )
 from template_control.embedding.planners.planner import ANY_ANGLE, Context, Decision, Planner
 from template_control.embedding.planners.speed_changes import SpeedChange, speed_changes
@@ -191,9 +191,7 @@ class AheadPlanner(Planner):
         self._spacing = SPACING * scale.speed
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters)
-        self.limits = limits or WalkLimits(
-            KNEE_MOMENT * scale.length * parameters.mass * parameters.gravity, self.speeds
-        )
+        self.limits = limits or WalkLimits(usual_knee_moment(parameters), self.speeds)
         if not self.limits.light:
             pace = min(o.pace, _HEAVY_PACE * scale.speed)
             o = self.options = replace(o, changes=0, pace=pace)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from template_control.checks.checked import checked
-from template_control.embedding.planners.ahead import AheadPlanner, WalkLimits
+from template_control.embedding.planners.ahead import AheadPlanner
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import AGILE, RunningOptions, RunningPlanner
@@ -85,11 +85,7 @@ def _standing(route: Route, given: StandingOptions) -> Planners:
 
 @checked
 def default_planners(
-    route: Route,
-    walking: Planner | None = None,
-    *,
-    standing: StandingOptions | None = None,
-    limits: WalkLimits | None = None,
+    route: Route, walking: Planner | None = None, *, standing: StandingOptions | None = None
 ) -> Planners:
     """A planner for every kind of stride that the library can plan on a robot.
 
@@ -102,7 +98,6 @@ def default_planners(
         walking: plans the walking steps instead of the library's own planner.
         standing: the robot's, for the reference template (:func:`.standing_options`); the height
             is the route's. None: of feet that are points.
-        limits: see :class:`~.planners.ahead.AheadPlanner`.
 
     Raises:
         GaitError: if there is no gait at the speed the route begins with.
@@ -122,7 +117,7 @@ def default_planners(
         isinstance(route, ScenarioRoute) and route.pushes_off
     )
     if any_speed:
-        walk = walking or AheadPlanner(p, speed=speed, limits=limits)
+        walk = walking or AheadPlanner(p, speed=speed)
         if not (isinstance(route, SpeedRoute) and "run" in route.gaits):
             return {walk.gait.stride: walk, **stands}
     else:

@@ -118,6 +118,13 @@ _SECOND_PUSH_OFF_STEPS = (
 )
 _REST_ROUNDS = 6  # of Gauss and Newton's method; most choices take three
 
+
+def usual_knee_moment(parameters: SlipParameters) -> float:
+    """Moment of the leg force about the knee that costs nothing [N m]: five-link's, scaled."""
+    p = parameters
+    return KNEE_MOMENT * Scale.of(p).length * p.mass * p.gravity
+
+
 WALK = (*STRIDES, *SEARCH)
 """Compiled functions of the planner."""
 
@@ -259,7 +266,7 @@ class LqrPlanner(Planner):
             stiffness=p.leg_stiffness,
             knee_load=KneeLoadPenalty(
                 KNEE_STRAIGHT * self._scale.length,
-                KNEE_MOMENT * self._scale.length * p.mass * p.gravity,
+                usual_knee_moment(p),
                 o.knee_load_price,
             ),
             kernel=stride_kernel(p, self._here.stride),
