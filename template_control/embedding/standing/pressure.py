@@ -16,7 +16,6 @@ a quadratic program with bounds, which :func:`bounded` solves.
 
 from __future__ import annotations
 
-from math import factorial
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +33,8 @@ UNLOADING = 0.06
 """Time over which a foot that is to lift off gives up its load [s, of the reference template]."""
 LIGHTEST = 0.05
 """Least load of the legs, over the weight: they do not pull."""
+MISSED = 5.0
+"""Excess that a metre counts as by which the end of a way is missed."""
 _ROUNDS = 30  # of the active set
 _HELD = 1e-9  # [m]: a bound that is nearer holds
 # Largest w times the duration that is planned with, about twice that of a CoM that stays up. One
@@ -126,32 +127,67 @@ def pressure(
     where it may jump; ``prices`` are T and R [s]. The miss is |x_N - x*| + |x'_N - x'*| / w_N.
     Rates that are too large to plan with are made smaller.
     """
-    n = p.shape[0]
-    smooth, arrive = prices
+    gain, left = np.empty((2, p.shape[0])), np.empty(2)
+    _response(pieces, start, end, gain, left)
+    return _solved(pieces, gain, left, first, prices, p)
+
+
+@compiled
+def _response(pieces: Pieces, start: Array, end: Array, gain: Array, left: Array) -> None:
+    """Write what of x and x' / w (2,) at the end is ``left`` to p, and the ``gain`` (2, n) of each.
+
+    Rates that are too large to plan with are made smaller.
+    """
+    n = pieces.rate.shape[0]
     most = _GROWTH / pieces.duration.sum()
+    x, v = start[0], start[1]
     for k in range(n):
         pieces.rate[k] = min(pieces.rate[k], most)
-    # x_N = free + sum gain_k p_k, the same of x'_N / w_N.
-    gain, free = np.empty((2, n)), np.empty(2)
-    last = pieces.rate[n - 1]
-    free[0], free[1] = start[0], start[1]
-    for k in range(n):
         w, dt = pieces.rate[k], pieces.duration[k]
         c, s = np.cosh(w * dt), np.sinh(w * dt)
         for j in range(k):
             ahead, speed = gain[0, j], gain[1, j]
             gain[0, j], gain[1, j] = c * ahead + s / w * speed, w * s * ahead + c * speed
         gain[0, k], gain[1, k] = 1.0 - c, -w * s
-        free[0], free[1] = c * free[0] + s / w * free[1], w * s * free[0] + c * free[1]
+        x, v = c * x + s / w * v, w * s * x + c * v
+    last = pieces.rate[n - 1]
     for j in range(n):
         gain[1, j] /= last
-    left0, left1 = end[0] - free[0], (end[1] - free[1]) / last
+    left[0], left[1] = end[0] - x, (end[1] - v) / last
+
+
+@compiled
+def _least_miss(pieces: Pieces, gain: Array, left: Array) -> float:
+    """A miss that no p within its bounds can fall below [m]."""
+    least = 0.0
+    for sign in (-1.0, 1.0):
+        low = high = -left[0] - sign * left[1]
+        for k in range(gain.shape[1]):
+            g = gain[0, k] + sign * gain[1, k]
+            low += g * (pieces.low[k] if g > 0.0 else pieces.high[k])
+            high += g * (pieces.high[k] if g > 0.0 else pieces.low[k])
+        least = max(least, low, -high)
+    return least
+
+
+@compiled
+def _solved(
+    pieces: Pieces,
+    gain: Array,
+    left: Array,
+    first: float,
+    prices: tuple[float, float],
+    p: Array,
+) -> float:
+    """Write the best p (n,); the miss [m]."""
+    n = p.shape[0]
+    smooth, arrive = prices
     matrix, right = np.zeros((n, n)), np.empty(n)
     for i in range(n):
         for j in range(n):
             matrix[i, j] = arrive * (gain[0, i] * gain[0, j] + gain[1, i] * gain[1, j])
         matrix[i, i] += pieces.duration[i]
-        right[i] = arrive * (gain[0, i] * left0 + gain[1, i] * left1)
+        right[i] = arrive * (gain[0, i] * left[0] + gain[1, i] * left[1])
         right[i] += pieces.duration[i] * pieces.wish[i]
         price = smooth * smooth / pieces.duration[i]
         if i > 0:
@@ -163,83 +199,98 @@ def pressure(
             matrix[0, 0] += price
             right[0] += price * first
     bounded(matrix, right, pieces.low, pieces.high, p)
-    for j in range(n):
-        left0 -= gain[0, j] * p[j]
-        left1 -= gain[1, j] * p[j]
-    return abs(left0) + abs(left1)
+    miss = 0.0
+    for axis in range(2):
+        off = left[axis]
+        for j in range(n):
+            off -= gain[axis, j] * p[j]
+        miss += abs(off)
+    return miss
 
 
 class Ground(NamedTuple):
-    """Ground under both feet, and how its use is priced."""
+    """Template, and how the use of the ground under its feet is priced."""
 
-    rear: float  # x of the feet [m]
-    front: float
-    low: float  # x between which both together bear the centre of pressure [m]
-    high: float
     gravity: tuple[float, float]  # its parts into the ground, and along it, backward [m/s^2]
     reach: float  # longest way from a foot to the CoM [m]
     slack: float  # excess that costs nothing [m]
-    pace: float  # price of a second more or less than the next [m/s]
-    calm: float  # duration that is liked best [s]
-    unloading: float  # time before the end in which the rear foot gives up its load [s]; 0: none
+    unloading: float  # time before a liftoff in which the foot gives up its load [s]
     smooth: float  # T [s]
     arrive: float  # R [s]
 
 
-@compiled
-def best_pressure(
-    start: Array, ends: Array, durations: Array, ground: Ground, jumps: bool, p: Array, rates: Array
-) -> tuple[float, float, int, int]:
-    """Cost and excess [m] of the best curve: excess beyond the slack, and time.
+class Ways(NamedTuple):
+    """Ways of the CoM that are tried, the cheapest first. They go through s stages each.
 
-    The height is a quintic, between the states x, y, each position, velocity and acceleration, of
-    ``start`` (2, 3) and of ``ends`` (n, 2, 3); ``durations`` (d,) are tried to each of these [s].
-    One within the slack is better than any that is not. Where p ``jumps``, it may at once be
-    anywhere. The excess is the miss of the end, or by how far a leg would be longer than its reach.
-    Centres of pressure ``p`` (k,) and w ``rates`` (k,) of the pieces are overwritten; also returns
-    the numbers of the end and of the duration.
+    Stages are (n, s, 7): duration [s]; low and high, x between which the feet bear the centre of
+    pressure; where it is liked best; x of both feet that stand [m]; whether the first of them lifts
+    off at the stage's end.
     """
-    n, g = p.shape[0], ground.gravity[0]
-    best, least, chosen, lasting, fits = np.inf, np.inf, 0, 0, False
-    rise, low, high = np.empty(TERMS), np.empty(n), np.empty(n)
-    wish, lasts, rate, found = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    for i in range(durations.shape[0]):
-        t = durations[i]
-        time = ground.pace * (t + ground.calm * ground.calm / t)
-        if fits and time >= best:
+
+    stages: Array
+    ends: Array  # (n, 2, 3) x and y where they end, each position, velocity, acceleration
+    price: Array  # (n,) [m]
+
+
+@compiled
+def best_way(
+    start: Array, ways: Ways, ground: Ground, jumps: bool, p: Array, rates: Array
+) -> tuple[int, float, float]:
+    """Number, cost and excess [m] of the best way from ``start`` (2, 3).
+
+    The height is a quintic. The cost is the price and the excess beyond the slack: the miss of the
+    end, or by how far a leg would be longer than its reach. A way within the slack is better than
+    any that is not. Where p ``jumps``, it may at once be anywhere. Centres of pressure ``p`` (k,)
+    and w ``rates`` (k,) are overwritten; each stage has as many pieces.
+    """
+    n, across, along = p.shape[0], ground.gravity[0], ground.gravity[1]
+    count, stages = n // ways.stages.shape[1], ways.stages.shape[1]
+    best, least, chosen, rise = np.inf, np.inf, 0, np.empty(TERMS)
+    pieces = Pieces(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
+    found, gain, left = np.empty(n), np.empty((2, n)), np.empty(2)
+    shift = np.empty(n)
+    for i in range(ways.price.shape[0]):
+        quintic(start[1], ways.ends[i, 1], ways.stages[i, :, 0].sum(), rise)
+        time = 0.0
+        for k in range(n):
+            stage = ways.stages[i, k // count]
+            dt, open_ = stage[0] / count, 1.0
+            # The acceleration at the end is that of the path after it.
+            y, _, lift = polynomial(rise, time + (0.5 if k < n - 1 else 1.0) * dt)
+            lift = max(across + lift, LIGHTEST * across)
+            pieces.duration[k] = dt
+            pieces.rate[k] = np.sqrt(lift / max(y, LIGHTEST * ground.reach))
+            if stage[6] > 0.0:
+                open_ = min((count - k % count - 1) * dt / ground.unloading, 1.0)
+            # On a slope the CoM is as over a centre of pressure further uphill.
+            shift[k] = along / pieces.rate[k] ** 2
+            pieces.low[k] = stage[5] + open_ * (stage[1] - stage[5]) + shift[k]
+            pieces.high[k] = stage[5] + open_ * (stage[2] - stage[5]) + shift[k]
+            pieces.wish[k] = stage[3] + shift[k]
+            time += dt
+        _response(pieces, start[0], ways.ends[i, 0], gain, left)
+        if MISSED * _least_miss(pieces, gain, left) - ground.slack + ways.price[i] >= best:
             continue
-        for e in range(ends.shape[0]):
-            quintic(start[1], ends[e, 1], t, rise)
-            goal = ground.front if ground.unloading > 0.0 else ends[e, 0, 0]
+        first = np.nan if jumps else start[0, 0] - start[0, 2] / pieces.rate[0] ** 2
+        prices = (ground.smooth, ground.arrive)
+        excess = MISSED * _solved(pieces, gain, left, first, prices, found)
+        x, v, time = start[0, 0], start[0, 1], 0.0
+        for k in range(n):
+            x, v = _after(x, v, pieces.rate[k], found[k], pieces.duration[k])
+            time += pieces.duration[k]
+            y, _, _ = polynomial(rise, time)
+            stage = ways.stages[i, k // count]
+            away = max(x - stage[4], stage[5] - x)
+            excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
+        cost = max(excess - ground.slack, 0.0) + ways.price[i]
+        fits = excess <= ground.slack
+        if fits or cost < best:
+            best, least, chosen = cost, excess, i
             for k in range(n):
-                lasts[k] = t / n
-                y, _, lift = polynomial(rise, (k + 0.5) * t / n)
-                lift = max(g + lift, LIGHTEST * g)
-                rate[k] = np.sqrt(lift / max(y, LIGHTEST * ground.reach))
-                wish[k], left = goal, 1.0
-                if ground.unloading > 0.0:
-                    left = min((n - k - 1) * t / n / ground.unloading, 1.0)
-                    low[k] = goal + left * (ground.low - goal)
-                    high[k] = goal + left * (ground.high - goal)
-                else:
-                    low[k], high[k] = ground.low, ground.high
-            pieces = Pieces(lasts, rate, low, high, wish)
-            first = np.nan if jumps else start[0, 0] - start[0, 2] / rate[0] ** 2
-            prices = (ground.smooth, ground.arrive)
-            excess = pressure(pieces, start[0], ends[e, 0], first, prices, found)
-            x, v = start[0, 0], start[0, 1]
-            for k in range(n):
-                x, v = _after(x, v, rate[k], found[k], lasts[k])
-                y, _, _ = polynomial(rise, (k + 1) * t / n)
-                away = max(x - ground.rear, ground.front - x)
-                excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
-            cost = max(excess - ground.slack, 0.0) + time
-            holds = excess <= ground.slack
-            if (holds and not fits) or (holds == fits and cost < best):
-                best, least, chosen, lasting, fits = cost, excess, e, i, holds
-                for k in range(n):
-                    p[k], rates[k] = found[k], rate[k]
-    return best, least, chosen, lasting
+                p[k], rates[k] = found[k], pieces.rate[k]
+        if fits:
+            break
+    return chosen, best, least
 
 
 @compiled
@@ -250,21 +301,37 @@ def _after(x: float, v: float, w: float, p: float, dt: float) -> tuple[float, fl
 
 
 def curve_over(
-    start: Array, end: Array, duration: float, pressures: Array, rates: Array
+    start: Array, end: Array, durations: Array, pressures: Array, rates: Array
 ) -> tuple[Quintic, ...]:
-    """The curve of a duration [s] over centres of pressure (n,) [m], w (n,) being ``rates``."""
-    rise = Quintic.between(start, end, duration).coefficients[1]
-    (x, v), dt, time = start[0, :2], duration / len(rates), 0.0
-    found = []
-    for p, w in zip(pressures, rates, strict=True):
-        c = np.empty((2, TERMS))
-        for n in range(TERMS):  # of p + (x - p) cosh(w t) + v sinh(w t) / w
-            c[0, n] = (v if n % 2 else x - p) * w ** (n - n % 2) / factorial(n)
-        c[0, 0], c[1] = x, _from(rise, time)
+    """The curve over centres of pressure (n,) [m], for ``durations`` (n,) [s] and w ``rates``.
+
+    Its height comes to that of ``end`` (2, 3); what x misses of it is left.
+    """
+    rise = Quintic.between(start, end, float(durations.sum())).coefficients[1]
+    (x, v), time, found = start[0, :2], 0.0, []
+    for dt, p, w in zip(durations.tolist(), pressures, rates, strict=True):
+        c, begin = np.empty((2, TERMS)), np.array([x, v, w * w * (x - p)])
+        x, v = _after(x, v, w, p, dt)
+        quintic(begin, np.array([x, v, w * w * (x - p)]), dt, c[0])
+        c[1] = _from(rise, time)
         found.append(Quintic(c, dt))
-        x, v, _ = polynomial(c[0], dt)
         time += dt
     return tuple(found)
+
+
+def led_to(end: Array, pieces: tuple[Quintic, ...], rate: float) -> tuple[Quintic, ...]:
+    """A curve with what it misses of place and speed of its ``end`` (2, 3) added, smoothly.
+
+    Its last centre of pressure stays, by the last w, ``rate``.
+    """
+    missed, time, led = end - pieces[-1].end(), 0.0, []
+    missed[:, 2] = rate**2 * missed[:, 0]
+    whole = sum(piece.duration for piece in pieces)
+    added = Quintic.between(np.zeros((2, 3)), missed, whole).coefficients
+    for c, dt in pieces:
+        led.append(Quintic(c + [_from(one, time) for one in added], dt))
+        time += dt
+    return tuple(led)
 
 
 def _from(polynomial: Array, time: float) -> Array:
@@ -279,9 +346,10 @@ def _from(polynomial: Array, time: float) -> Array:
 def plans() -> None:
     """A plan, and a curve's value, made to compile them."""
     states, one = np.ones((1, 2, 3)), np.ones(2)
-    feet, gravity = (0.0, 1.0, 0.0, 1.0), (9.81, 0.0)
-    ground = Ground._make((*feet, gravity, 1.0, 0.0, 1.0, 1.0, 0.1, SMOOTH, ARRIVE))
-    best_pressure(states[0], states, one, ground, False, one.copy(), one.copy())
+    ground = Ground((9.81, 0.0), 1.0, 0.0, UNLOADING, SMOOTH, ARRIVE)
+    best_way(
+        states[0], Ways(np.ones((1, 1, 7)), states, np.ones(1)), ground, False, one, one.copy()
+    )
     polynomial(one, 1.0)
 
 
