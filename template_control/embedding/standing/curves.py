@@ -130,11 +130,12 @@ _CALM = 0.3  # duration that is liked best [s]
 # Excess that a second more or less counts as [m/s]. Near its end a curve that is planned anew had
 # better miss it by millimetres than swing back once more.
 _PACE = 0.01
-_DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s]
+_DURATIONS = np.geomspace(0.03, 1.6, 18)  # that are tried [s]
 # Of a step: times before the liftoff, in the air and after the touchdown.
-_LIFTS, _SWINGS, _RESTS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.1, 0.6, 6), (0.3, 0.6, 0.9)
+_LIFTS, _SWINGS, _RESTS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.05, 0.6, 9), (0.3, 0.6, 0.9)
 _NIMBLE = 1.8  # largest mean speed of a foot in the air [m/s]
 _SPARE = 0.06  # distance of the centre of pressure from both feet after a touchdown [m]
+_NARROW = 0.02  # price of a metre between the feet beyond CLOSING
 _FARTHEST = 0.65  # foothold, ahead of the foot that stands [m]
 
 
@@ -182,7 +183,7 @@ class BetweenFeet:
         half = SOLE_SHARE * o.half_length + o.slant * abs(self.spacing)  # as the CoM is held there
         times = _DURATIONS * self._scale.time
         stage = self._both(times, wanted, 0.0, half if o.slant else _SHARE * o.half_length)
-        return self._best(start, stage, self.at_rest(wanted)[None], lands)[0]
+        return self._best(start, stage, self.at_rest(wanted)[None], self._price(times), lands)[0]
 
     def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
         """Curve to one of several states (n, 2, 3) of the rear foot's liftoff, and its number.
@@ -201,8 +202,9 @@ class BetweenFeet:
         elif not (lands or moves):
             times = np.unique(np.maximum(times, self.options.shift))
         n = len(ends)
+        price, ends = self._price(np.repeat(times, n)), np.tile(ends, (len(times), 1, 1))
         stage = self._both(np.repeat(times, n), self.toes[1], 1.0)
-        found, number = self._best(start, stage, np.tile(ends, (len(times), 1, 1)), lands)
+        found, number = self._best(start, stage, ends, price, lands)
         return found, number % n
 
     def by_step(self, start: Array, lifted: bool) -> Found:
@@ -245,27 +247,33 @@ class BetweenFeet:
         )
         ends = np.repeat(self.at_rest(0.0)[None], len(foot), axis=0)
         ends[:, 0, 0] += middle
-        return self._best(start, stages[:, 1:] if lifted else stages, ends, False)[0]
+        if lifted:  # it is to come down
+            stages, price = stages[:, 1:], _PACE * self._scale.speed * air
+        else:
+            price = self._price(both) + self._price(air)
+        price += self._price(rest) + _NARROW * (foot - stands - nearest)
+        return self._best(start, stages, ends, price, False)[0]
 
-    def _both(
-        self, times: Array, wanted: float, lifts: float, half: float | None = None
-    ) -> Array:
+    def _both(self, times: Array, wanted: float, lifts: float, half: float | None = None) -> Array:
         """Stages (n, 1, 7) on both feet, for ``times`` (n,) [s]."""
         middle = self.place(PLACE)
         half = _SHARE * self.options.half_length if half is None else half
         low, high = min(middle - half, *self.toes), max(middle + half, *self.toes)
         return stage(times, low, high, wanted, *self.toes, lifts)
 
+    def _price(self, lasts: Array) -> Array:
+        """Of times on a curve [m]."""
+        unit = self._scale
+        return _PACE * unit.speed * (lasts + (_CALM * unit.time) ** 2 / lasts)
+
     def _best(
-        self, start: Array, stages: Array, ends: Array, jumps: bool
+        self, start: Array, stages: Array, ends: Array, price: Array, jumps: bool
     ) -> tuple[Found, int]:
         """The best curve through one of (n, s, 7) stages to one of ``ends`` (n, 2, 3)."""
         o, unit = self.options, self._scale
-        start, calm = start.copy(), _CALM * unit.time
+        start = start.copy()
         # Where a foot lands late, the template has begun to fall.
         start[1, 2] = max(start[1, 2], -_FALL * self.parameters.gravity)
-        lasts = stages[:, :, 0]
-        price = _PACE * unit.speed * (lasts + calm**2 / lasts).sum(axis=1)
         order = np.argsort(price, kind="stable")
         ends = np.broadcast_to(ends, (len(price), 2, 3))
         ways = Ways(stages[order], ends[order], price[order])

@@ -170,7 +170,7 @@ class PassTable:
                 last = min(d - speed / rate * np.sinh(rate * self.options.single), last)
                 s = 0.5 * (d + (speed**2 - energy) / (rate**2 * d))
                 s = max(min(s, last), x)
-                price += max(spare - min(last - s, s - x), 0.0)
+                price += max(0.5 * spare - min(last - s, s - x), 0.0)
                 reached = float(np.sqrt(max(energy + rate**2 * d * (2.0 * s - d), 0.0)))
                 price += _OFF * abs(reached - speed)
             if price < best[0]:

@@ -8,6 +8,7 @@ one forward: all is planned forward, and turned round.
 from __future__ import annotations
 
 from dataclasses import replace
+
 import numpy as np
 
 from template_control.arrays import Array
@@ -197,12 +198,18 @@ class CurvePlanner(Planner):
         ways, present = [], float(start[0, 1])
         if not self._lands:
             wanted, present = max(wanted, self._passes.options.slowest), 0.0
-        for speed in self._passes.between(wanted, present):
-            over = self._passes.at(speed)
+        speeds = self._passes.between(wanted, present)
+        i, fails, holds = 0, 0, len(speeds)
+        while i < holds:
+            over = self._passes.at(speeds[i])
             found, _ = feet.to_liftoff(start, shifted(over.way, feet.toes[1]), self._lands)
-            ways.append((found, over))
             if feet.fits(found):
-                return ways[-1]
+                ways, holds = [(found, over)], i
+            else:
+                fails = i
+                if holds == len(speeds):
+                    ways.append((found, over))
+            i = (fails + holds + 1) // 2
         return min(ways, key=lambda way: way[0].cost)
 
     def _rest(self, node: str, start: Array, toes: tuple[float, float]) -> tuple[Stride, bool]:
@@ -229,7 +236,9 @@ class CurvePlanner(Planner):
         feet = passes.feet((way * lifts, way * stays))
         found = feet.by_step(ahead, lifted)
         foothold = float(found.stages[-1, 5])
-        middle = feet.toes[1] if lifted else feet.place(PLACE) - 0.01 * passes.parameters.rest_length
+        middle = (
+            feet.toes[1] if lifted else feet.place(PLACE) - 0.01 * passes.parameters.rest_length
+        )
         fits = (lifted or found.excess <= self._launch) and passes.capture(ahead) > middle
         *before, last = found.parts()
         landed = passes.feet((feet.toes[1], foothold))

@@ -244,7 +244,7 @@ def best_way(
     and w ``rates`` (k,) are overwritten; each stage has as many pieces.
     """
     n, across, along = p.shape[0], ground.gravity[0], ground.gravity[1]
-    count, stages = n // ways.stages.shape[1], ways.stages.shape[1]
+    count = n // ways.stages.shape[1]
     best, least, chosen, rise = np.inf, np.inf, 0, np.empty(TERMS)
     pieces = Pieces(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
     found, gain, left = np.empty(n), np.empty((2, n)), np.empty(2)
