@@ -7,7 +7,7 @@ one too.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
@@ -18,6 +18,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
+from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.standing.pressure import (
     SMOOTH,
     UNLOADING,
@@ -105,36 +106,40 @@ def standing_pose(
 class Found(NamedTuple):
     """The best curve found."""
 
-    pieces: tuple[Quintic, ...]  # in order, as many for each stage
-    stages: Array  # (s, 7) of :class:`Ways`
+    parts: list[tuple[Quintic, ...]]  # its pieces, by stage
     excess: float  # miss of its end, or by how far a leg leaves its reach [m]
-    cost: float  # excess beyond the slack, and time [m]
+    cost: float  # excess beyond the slack, and its price [m]
+    number: int  # of the way
 
-    def parts(self) -> list[tuple[Quintic, ...]]:
-        """The pieces of each stage."""
-        n = len(self.pieces) // len(self.stages)
-        return [self.pieces[i : i + n] for i in range(0, len(self.pieces), n)]
+    @property
+    def pieces(self) -> tuple[Quintic, ...]:
+        """Of all stages."""
+        return tuple(piece for part in self.parts for piece in part)
 
 
 _PIECES = 20  # of a curve of one stage
 _OF_STAGE = 8  # of each of several
 _FALL = 0.5  # largest downward acceleration that a curve begins with, over g
+_LED = 0.05  # excess up to which a curve is led to its end, over l0
 _LOW = 0.3  # least height of the CoM that a step is planned with [m], over l0
 _PASSING = 2.0  # longest time to a foot that is passed, over that at the present speed
 # Of the ground under the feet that a plan uses: folding legs ask for a little more.
 _SHARE = 0.8
 _STILL = 0.01  # over sqrt(g l0): a CoM that is faster does not begin at rest
 # For the reference template.
-_ARRIVE = 1e6  # R, what an error at the end costs [s]
+_ARRIVE = 2e4  # R, what an error at the end costs [s]
 _CALM = 0.3  # duration that is liked best [s]
 # Excess that a second more or less counts as [m/s]. Near its end a curve that is planned anew had
 # better miss it by millimetres than swing back once more.
 _PACE = 0.01
-_DURATIONS = np.geomspace(0.03, 1.6, 18)  # that are tried [s]
+_DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s]
+# Of the time to the liftoff at the mean of both speeds, tried where the CoM moves.
+_DIRECT = np.geomspace(0.8, 1.25, 8)
 # Of a step: times before the liftoff, in the air and after the touchdown.
-_LIFTS, _SWINGS, _RESTS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.05, 0.6, 9), (0.3, 0.6, 0.9)
+_LIFTS, _SWINGS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.05, 0.6, 9)
+_RESTS, _SOON = np.array([0.3, 0.6, 0.9]), np.array([1e-3])
 _NIMBLE = 1.8  # largest mean speed of a foot in the air [m/s]
-_SPARE = 0.06  # distance of the centre of pressure from both feet after a touchdown [m]
+_SPARE = 0.03  # distance of the centre of pressure from both feet after a touchdown [m]
 _NARROW = 0.02  # price of a metre between the feet beyond CLOSING
 _FARTHEST = 0.65  # foothold, ahead of the foot that stands [m]
 
@@ -179,14 +184,15 @@ class BetweenFeet:
 
         A front foot that has just landed (``lands``) takes up load at once.
         """
-        o, wanted = self.options, self.place(PLACE)
-        half = SOLE_SHARE * o.half_length + o.slant * abs(self.spacing)  # as the CoM is held there
+        o, wanted, beyond = self.options, self.place(PLACE), self._beyond
+        if o.slant:  # as the CoM is held there
+            beyond = SOLE_SHARE * o.half_length + o.slant * abs(self.spacing), 0.0
         times = _DURATIONS * self._scale.time
-        stage = self._both(times, wanted, 0.0, half if o.slant else _SHARE * o.half_length)
-        return self._best(start, stage, self.at_rest(wanted)[None], self._price(times), lands)[0]
+        stages = _stage(times, self.toes, beyond, wanted)
+        return self._best(start, stages, self.at_rest(wanted)[None], self._price(times), lands)
 
-    def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
-        """Curve to one of several states (n, 2, 3) of the rear foot's liftoff, and its number.
+    def to_liftoff(self, start: Array, ends: Array, lands: bool) -> Found:
+        """Curve to one of several states (n, 2, 3) of the rear foot's liftoff.
 
         A front foot that has just landed (``lands``) takes up load at once. The rear foot has no
         load left at the end.
@@ -201,100 +207,109 @@ class BetweenFeet:
             times = times[times <= max(longest, times[0])]
         elif not (lands or moves):
             times = np.unique(np.maximum(times, self.options.shift))
-        n = len(ends)
-        price, ends = self._price(np.repeat(times, n)), np.tile(ends, (len(times), 1, 1))
-        stage = self._both(np.repeat(times, n), self.toes[1], 1.0)
-        found, number = self._best(start, stage, ends, price, lands)
-        return found, number % n
+        times = np.repeat(times[:, None], len(ends), axis=1)
+        if moves:  # there is little choice
+            direct = 2.0 * (ends[:, 0, 0] - x) / (speed + ends[:, 0, 1])
+            times = np.vstack((times, np.maximum(direct * _DIRECT[:, None], times.min())))
+        ends = np.tile(ends, (len(times), 1, 1))
+        times = times.ravel()
+        stages = _stage(times, self.toes, self._beyond, self.toes[1], lifts=1.0)
+        return self._best(start, stages, ends, self._price(times), lands)
 
-    def by_step(self, start: Array, lifted: bool) -> Found:
-        """Curve to rest by a step of the rear foot ahead, which lifts off or is ``lifted``.
+    def by_step(
+        self, start: Array, lifted: bool, catching: CatchingStep | None = None
+    ) -> tuple[Found, float]:
+        """Curve to rest by a step of the rear foot ahead, and where it lands [m].
 
-        Of both stages that are left after the liftoff, the first is on the front foot.
+        It lifts off, or is ``lifted``; ``catching`` may say when and where it lands, and over which
+        centre of pressure.
         """
-        length, unit, stands = self._scale.length, self._scale.time, self.toes[1]
-        lifts = np.zeros(1) if lifted else _LIFTS * unit
-        tried = np.meshgrid(lifts, _SWINGS * unit, np.array(_RESTS) * unit, indexing="ij")
+        length, unit, (_, stands) = self._scale.length, self._scale.time, self.toes
+        lifts, swings, pressure = _LIFTS * unit, _SWINGS * unit, stands
+        if catching is not None:
+            lifts, swings, pressure = _SOON * unit, np.array([catching.lasts]), catching.pressure
+        tried = np.meshgrid(lifts[: 1 if lifted else None], swings, _RESTS * unit, indexing="ij")
         both, air, rest = (times.ravel() for times in tried)
+        both *= not lifted
         (x, speed, _), (y, *_) = start.tolist()
         rate = np.sqrt(self.parameters.gravity / max(y, _LOW * length))
         # Where the CoM and its capture point are at touchdown, over the foot that stands.
         growth = np.exp(rate * (both + air))
-        capture, x = growth * (x - stands + speed / rate), x - stands
-        com = 0.5 * (capture + (x - speed / rate) / growth)
-        nearest, half = CLOSING * length, _SHARE * self.options.half_length
-        foot = np.maximum(np.maximum(capture + _SPARE * length, com + 0.5 * nearest), nearest)
-        foot = np.minimum(foot, _FARTHEST * length)
-        spared = _NIMBLE * self._scale.speed * air - foot - self.spacing
-        inside = spared >= min(0.0, spared.max())
-        both, air, rest, foot = both[inside], air[inside], rest[inside], foot[inside]
-        middle, foot, spare = stands + 0.5 * foot, stands + foot, 0.5 * _SPARE * length
+        capture = growth * (x - stands + speed / rate)
+        com = 0.5 * (capture + (x - stands - speed / rate) / growth)
+        closing, spare = CLOSING * length, _SPARE * length
+        apart = np.maximum(np.maximum(capture + 2.0 * spare, com + 0.5 * closing), closing)
+        apart = np.minimum(apart, _FARTHEST * length)
+        spared = _NIMBLE * self._scale.speed * air - apart - self.spacing
+        if catching is not None:
+            apart, spared = np.full(len(air), catching.foothold - stands), np.zeros(len(air))
+        can = spared >= min(0.0, spared.max())
+        both, air, rest, apart = both[can], air[can], rest[can], apart[can]
+        foot, beyond = stands + apart, self._beyond
+        middle = 0.5 * (stands + foot)
+        feet = stands + spare * np.sign(apart), foot - spare * np.sign(apart)
         stages = np.concatenate(
             (
-                self._both(both, stands, 1.0),
-                stage(air, stands - half, stands + half, stands, stands, stands, 0.0),
-                stage(
-                    rest,
-                    np.minimum(middle - half, stands + spare),
-                    np.maximum(middle + half, foot - spare),
-                    middle,
-                    stands,
-                    foot,
-                    0.0,
-                ),
+                _stage(both, self.toes, beyond, stands, lifts=1.0),
+                _stage(air, (pressure, pressure), (0.0, 0.0), pressure),
+                _stage(rest, feet, beyond, middle),
             ),
             axis=1,
         )
         ends = np.repeat(self.at_rest(0.0)[None], len(foot), axis=0)
         ends[:, 0, 0] += middle
+        price = self._price(rest) + _NARROW * np.abs(apart - closing)
         if lifted:  # it is to come down
-            stages, price = stages[:, 1:], _PACE * self._scale.speed * air
+            stages, price = stages[:, 1:], price + _PACE * self._scale.speed * air
         else:
-            price = self._price(both) + self._price(air)
-        price += self._price(rest) + _NARROW * (foot - stands - nearest)
-        return self._best(start, stages, ends, price, False)[0]
+            price += self._price(both) + self._price(air)
+        found = self._best(start, stages, ends, price, False)
+        return found, float(foot[found.number])
 
-    def _both(self, times: Array, wanted: float, lifts: float, half: float | None = None) -> Array:
-        """Stages (n, 1, 7) on both feet, for ``times`` (n,) [s]."""
-        middle = self.place(PLACE)
-        half = _SHARE * self.options.half_length if half is None else half
-        low, high = min(middle - half, *self.toes), max(middle + half, *self.toes)
-        return stage(times, low, high, wanted, *self.toes, lifts)
+    @property
+    def _beyond(self) -> tuple[float, float]:
+        """By how much the ground for a plan reaches beyond the middle of the feet, and them [m]."""
+        half = self.options.half_length
+        return _SHARE * half, 0.0
 
     def _price(self, lasts: Array) -> Array:
         """Of times on a curve [m]."""
         unit = self._scale
         return _PACE * unit.speed * (lasts + (_CALM * unit.time) ** 2 / lasts)
 
-    def _best(
-        self, start: Array, stages: Array, ends: Array, price: Array, jumps: bool
-    ) -> tuple[Found, int]:
-        """The best curve through one of (n, s, 7) stages to one of ``ends`` (n, 2, 3)."""
-        o, unit = self.options, self._scale
+    def _best(self, start: Array, stages: Array, ends: Array, price: Array, jumps: bool) -> Found:
+        """The best curve through (n, s, 7) stages of :class:`Ways` to ``ends`` (n, 2, 3)."""
+        o, unit, p = self.options, self._scale, self.parameters
         start = start.copy()
         # Where a foot lands late, the template has begun to fall.
-        start[1, 2] = max(start[1, 2], -_FALL * self.parameters.gravity)
+        start[1, 2] = max(start[1, 2], -_FALL * p.gravity)
         order = np.argsort(price, kind="stable")
-        ends = np.broadcast_to(ends, (len(price), 2, 3))
-        ways = Ways(stages[order], ends[order], price[order])
-        ground = Ground(
-            self.parameters.gravity_parts,
-            o.reach * self.parameters.rest_length,
-            o.slack,
-            UNLOADING * unit.time,
-            SMOOTH * unit.time,
-            _ARRIVE * unit.time,
-        )
-        p, rates = np.empty((2, _PIECES if stages.shape[1] == 1 else _OF_STAGE * stages.shape[1]))
-        i, cost, excess = best_way(start, ways, ground, jumps, p, rates)
-        lasts = np.repeat(ways.stages[i, :, 0], len(p) // stages.shape[1])
-        lasts = lasts / (len(p) // stages.shape[1])
-        pieces = curve_over(start, ways.ends[i], lasts, p, rates)
-        if excess <= o.slack:
-            pieces = led_to(ways.ends[i], pieces, float(rates[-1]))
-        return Found(pieces, ways.stages[i], excess, cost), int(order[i])
+        ways = Ways(stages, np.broadcast_to(ends, (len(price), 2, 3)), price)
+        ways = Ways(*(column[order] for column in ways))
+        times = (time * unit.time for time in (UNLOADING, SMOOTH, _ARRIVE))
+        ground = Ground(p.gravity_parts, o.reach * p.rest_length, o.slack, *times, jumps)
+        count = _PIECES if stages.shape[1] == 1 else _OF_STAGE
+        pressures, rates = np.empty((2, count * stages.shape[1]))
+        i, cost, excess = best_way(start, ways, ground, pressures, rates)
+        lasts, end = np.repeat(ways.stages[i, :, 0] / count, count), ways.ends[i]
+        pieces = curve_over(start, end, lasts, pressures, rates)
+        if excess <= _LED * p.rest_length:
+            pieces = led_to(end, pieces, float(rates[-1]))
+        parts = [pieces[k : k + count] for k in range(0, len(pieces), count)]
+        return Found(parts, excess, cost, int(order[i]))
 
 
-def stage(*columns: Array | float) -> Array:
-    """Stages (n, 1, 7) of :class:`~.pressure.Ways`, by their columns."""
-    return np.stack(np.broadcast_arrays(*columns), axis=-1)[:, None]
+def _stage(
+    lasts: Array,
+    feet: Sequence[Array | float],
+    beyond: tuple[float, float],
+    wish: Array | float,
+    lifts: float = 0.0,
+) -> Array:
+    """Stages (n, 1, 7) of :class:`Ways`, on ground that reaches ``beyond`` middle and feet [m]."""
+    (rear, front), (half, slack) = feet, beyond
+    middle = 0.5 * (np.asarray(rear) + front)
+    low = np.minimum(middle - half, np.minimum(rear, front) - slack)
+    high = np.maximum(middle + half, np.maximum(rear, front) + slack)
+    columns = np.broadcast_arrays(lasts, low, high, wish, rear, front, lifts)
+    return np.stack(columns, axis=-1)[:, None]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from template_control.arrays import Array
 from template_control.embedding.standing.curves import CLOSING, BetweenFeet, StandingOptions
@@ -34,10 +34,9 @@ _STIFFNESS = (0.5, 4.0)  # least and greatest of the leg before touchdown, over 
 _YIELDING = (1.0, 0.85, 0.7)  # stiffnesses tried, over that with which the leg keeps its length
 _STEPS = (0.15, 0.65)  # shortest and longest step, over l0
 _NARROW = 0.02  # price of a metre between the feet, more or less than CLOSING
-# Distance of the capture point at landing from either foot, or of where the centre of pressure is to
-# move from the ends of its way, over l0.
-_SPARE = 0.06
-_OFF = 1.0  # price of a speed that is not the wanted one [s]
+_SPARE = 0.06  # distance of the capture point from either foot at a touchdown before rest, over l0
+_MOVING = 0.03  # way of the CoM while the centre of pressure moves to the front foot, over l0
+_OFF = 20.0  # price of a metre by which it would have to move sooner or later than it can
 # For the reference template.
 _LONGEST = 0.5  # way of the CoM in single stance before VLO [s]
 _LANDING = (0.16, 0.35)  # bounds of the shortest time from VLO to a touchdown [s]
@@ -55,13 +54,11 @@ class SingleSupportPass(NamedTuple):
 
 
 class Touchdown(NamedTuple):
-    """Touchdown of a walking step whose other foot is at x = 0."""
+    """Touchdown of a walking step."""
 
     angle: float  # of the leg that lands [rad]
     stiffness: float  # of the leg before it [N/m]
-    state: Array  # (2, 3) of the CoM
-    toe: float  # x of the foot that lands [m]
-    late: float  # by how much it comes later than the foot could [s]
+    speed: float  # at VLO that it leads to; 0: rest [m/s]
 
 
 class PassTable:
@@ -146,80 +143,72 @@ class PassTable:
         return SingleSupportPass(vlo, stiffness, states_at(past, times) * _MIRROR)
 
     def best_touchdown(
-        self, z: Array, angles: tuple[float, float], speed: float | None = None
-    ) -> tuple[Touchdown | None, float]:
-        """The step from a VLO state z (3,) after which a speed at VLO can be had best [m/s].
+        self, z: Array, angles: tuple[float, float], speeds: Sequence[float] = ()
+    ) -> Touchdown | None:
+        """The step from a VLO state z (3,) after which the first speed at VLO can be had [m/s].
 
-        Also returns the speed; None: rest. ``angles`` are the least and greatest touchdown angle
-        [rad]. By the linear pendulum: the centre of pressure moves to the foot that has landed, d
-        ahead, when the CoM is s past the other one, dx/dt^2 grows by w^2 d (2 s - d).
+        Without speeds: rest. ``angles`` are the least and greatest touchdown angle [rad]. By the
+        linear pendulum: where the centre of pressure moves to the foot that has landed, d ahead,
+        when the CoM is s past the other one, dx/dt^2 grows by w^2 d (2 s - d).
         """
-        best: tuple[float, Touchdown | None, float] = np.inf, None, 0.0 if speed is None else speed
-        length, spare = self.parameters.rest_length, _SPARE * self.parameters.rest_length
-        for step in self.touchdowns(z, angles):
-            d, (x, v, _), y = step.toe, step.state[0].tolist(), step.state[1, 0]
-            price, reached = _NARROW * abs(d - CLOSING * length), 0.0
-            if speed is None:
-                capture = self.capture(step.state)
-                price += max(spare - min(d - capture, capture), 0.0)
-            else:
-                rate = np.sqrt(self.parameters.gravity / y)
-                energy = v**2 - (rate * x) ** 2
-                # The other leg does not reach further.
-                last = float(np.sqrt(max((self.options.reach * length) ** 2 - y**2, 0.0)))
-                last = min(d - speed / rate * np.sinh(rate * self.options.single), last)
-                s = 0.5 * (d + (speed**2 - energy) / (rate**2 * d))
-                s = max(min(s, last), x)
-                price += max(0.5 * spare - min(last - s, s - x), 0.0)
-                reached = float(np.sqrt(max(energy + rate**2 * d * (2.0 * s - d), 0.0)))
-                price += _OFF * abs(reached - speed)
-            if price < best[0]:
-                best = price, step, reached
-        return best[1:]
-
-    def touchdowns(self, z: Array, angles: tuple[float, float]) -> list[Touchdown]:
-        """Steps that may be made from a VLO state z (3,).
-
-        ``angles`` are the least and greatest touchdown angle [rad].
-        """
-        p, (least, most) = self.parameters, _STIFFNESS
-        load = p.mass * (p.gravity - z[0] ** 2 / p.rest_length)
-        k = float(load / max(p.rest_length - float(z[1]), 1e-6))  # with which it keeps its length
-        k0 = p.leg_stiffness
-        tried = {min(max(share * k, least * k0), most * k0) for share in _YIELDING}
-        steps = [step for k in sorted(tried) for step in self._touchdowns(z, k, angles)]
+        p, length = self.parameters, self.parameters.rest_length
+        low, high = (share * p.leg_stiffness for share in _STIFFNESS)
+        load = p.mass * (p.gravity - z[0] ** 2 / length)
+        k = float(load / max(length - float(z[1]), 1e-6))  # with which it keeps its length
+        tried = sorted({min(max(share * k, low), high) for share in _YIELDING})
+        steps = np.concatenate([self._touchdowns(z, k, angles) for k in tried])
+        if not len(steps):
+            return None
         # Where no step leaves the foot its time, the one that leaves it most has to do.
-        return [s for s in steps if s.late >= 0.0] or sorted(steps, key=lambda s: -s.late)[:1]
+        steps = steps[steps[:, 6] >= min(0.0, steps[:, 6].max())]
+        _, _, x, y, v, d, _ = steps.T
+        rate = np.sqrt(p.gravity / y)
+        uphill = p.gravity_parts[1] / rate**2  # on a slope the CoM is as over feet further there
+        price = _NARROW * np.abs(d - CLOSING * length)[None]
+        if len(speeds):
+            after = np.array(speeds)[:, None]
+            gained = after**2 - (rate * uphill) ** 2 - v**2 + (rate * (x - uphill)) ** 2
+            s = uphill + 0.5 * (d + gained / (rate**2 * d))
+            # The rear leg does not reach further, and the foot has to pass.
+            last = np.sqrt(np.maximum((self.options.reach * length) ** 2 - y**2, 0.0))
+            last = np.minimum(last, d - after / rate * np.sinh(rate * self.options.single))
+            room = np.minimum(last - _MOVING * length - s, s - x)
+            price = price + _OFF * np.maximum(-room, 0.0)
+            price += self.scale.time * np.abs(after - speeds[0])
+        else:
+            capture = x - uphill + v / rate
+            price += np.maximum(_SPARE * length - np.minimum(d - capture, capture), 0.0)
+        at, i = np.unravel_index(price.argmin(), price.shape)
+        speed = float(speeds[at]) if len(speeds) else 0.0
+        return Touchdown(float(steps[i, 0]), float(steps[i, 1]), speed)
 
-    def _touchdowns(
-        self, z: Array, stiffness: float, angles: tuple[float, float]
-    ) -> list[Touchdown]:
-        """Of all angles from one way past VLO: the foot lands when the CoM sinks to its leg."""
+    def _touchdowns(self, z: Array, stiffness: float, angles: tuple[float, float]) -> Array:
+        """Steps (n, 7) from one way past VLO: the foot lands when the CoM sinks to its leg.
+
+        Angle and stiffness, the CoM's x, y and dx/dt, x of the foot, and by how much it lands later
+        than it could [s].
+        """
         length = self.parameters.rest_length
         top = float(np.arcsin(min(z[1] / length, 1.0))) - 0.005
-        tried = np.unique(np.clip(np.linspace(_FLATTEST, top, _ANGLES), *angles))
-        u = controls(max(float(tried[0]) - _FLATTER, _FLAT), stiffness, stiffness)
+        angle = np.unique(np.clip(np.linspace(_FLATTEST, top, _ANGLES), *angles))
+        u = controls(max(float(angle[0]) - _FLATTER, _FLAT), stiffness, stiffness)
         stride = self._simulator.run(self._node, VLO.state(z), u)
-        end = min(stride.time_of(Event.TOUCHDOWN), stride.duration)
-        grid = np.linspace(0.0, end, _POINTS)
-        levels, (shortest, longest) = stride.sample(grid)[:, 1], (step * length for step in _STEPS)
-        soonest, latest = (time * self.scale.time for time in _LANDING)
-        found = []
-        for angle in tried.tolist():
-            low = levels <= length * np.sin(angle)
-            falls = np.flatnonzero(~low[:-1] & low[1:])
-            if not len(falls):
-                continue
-            i = falls[0]
-            share = (levels[i] - length * np.sin(angle)) / (levels[i] - levels[i + 1])
-            time = float(grid[i] + share * (grid[i + 1] - grid[i]))
-            state = states_at(stride, [time])[0]
-            toe = float(state[0, 0] + length * np.cos(angle))
-            if shortest <= toe <= longest or len(tried) == 1:
-                swift = toe / (_SWIFTNESS * max(float(z[0]), 1e-6))
-                late = time - float(np.clip(swift, soonest, latest))
-                found.append(Touchdown(angle, stiffness, state, toe, late))
-        return found
+        grid = np.linspace(0.0, min(stride.time_of(Event.TOUCHDOWN), stride.duration), _POINTS)
+        levels = stride.sample(grid)[:, 1]
+        sinks = int(levels.argmax())
+        depth = np.maximum.accumulate(-levels[sinks:])
+        time = np.interp(-length * np.sin(angle), depth, grid[sinks:], np.nan, np.nan)
+        lands = np.isfinite(time)
+        angle, time = angle[lands], time[lands]
+        x, y, v, *_ = stride.sample(time).T
+        toe = x + length * np.cos(angle)
+        shortest, longest = (step * length for step in _STEPS)
+        soonest, latest = (bound * self.scale.time for bound in _LANDING)
+        swift = toe / (_SWIFTNESS * max(float(z[0]), 1e-6))
+        late = time - np.clip(swift, soonest, latest)
+        same = np.full(len(angle), stiffness)
+        found = np.stack((angle, same, x, y, v, toe, late), axis=-1)
+        return found if len(lands) == 1 else found[(shortest <= toe) & (toe <= longest)]
 
 
 def shifted(states: Array, x: float) -> Array:
@@ -229,6 +218,6 @@ def shifted(states: Array, x: float) -> Array:
     return there
 
 
-def states_at(stride: Stride, times: ArrayLike) -> Array:
+def states_at(stride: Stride, times: Array) -> Array:
     """(n, 2, 3) states of the CoM at times (n,) of a stride [s]."""
     return stride.sample(times).reshape(-1, 3, 2).swapaxes(1, 2).copy()

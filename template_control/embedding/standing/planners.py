@@ -28,11 +28,10 @@ from template_control.embedding.standing.curves import (
     StandingOptions,
 )
 from template_control.embedding.standing.passes import PassTable, SingleSupportPass, shifted
-from template_control.embedding.standing.pressure import curve_over
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
-from template_control.slip.dynamics.timed import TERMS, Quintic, chained, timed_stride
+from template_control.slip.dynamics.timed import Quintic, chained, timed_stride
 from template_control.slip.gaits.gait import Gait, GaitsBySpeed
 from template_control.slip.gaits.walking_by_speed import paper_walks, walking_by_speed
 from template_control.slip.parameters import SlipParameters
@@ -53,10 +52,9 @@ step from a stand ends this long after its curve, when the robot has come to res
 STEP_DURATION = 1.5
 """Duration of a step from a stand, about [s], for the reference template."""
 _STILL = 0.1  # least time in which the CoM rests where its curve has led it [s]
-_LOW = 0.3  # of l0: the least height of the CoM that a catching step is planned with
-_CATCHING = 4  # pieces of the CoM's way over one foot
+# How far behind the middle of the feet the capture point may be before a step, over l0.
+_BEHIND = 0.01
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
-_SOON = 1e-3  # [s]
 # Excess of a curve to a liftoff that is still followed, over l0: the QP keeps the centre of
 # pressure inside. Without a step the robot would fall.
 _LAUNCH = 0.05
@@ -85,10 +83,12 @@ class CurvePlanner(Planner):
         self._speed = 0.0  # at VLO, to which the last curve leads [m/s]
         self._steps = stride in STEPS
         self._way = -1.0 if stride == StrideKind.STEP_BACK else 1.0
-        lasts = STEP_DURATION * passes.scale.time if self._steps else self._beat
+        lasts, kind = self._beat, StrideKind.STAND
+        if self._steps:
+            lasts, kind = STEP_DURATION * passes.scale.time, StrideKind(stride)
         state, none = np.array([0.0, passes.options.height, 0.0]), np.zeros(NUM_SLOTS)
         # No spring carries: a stride that returns to its state in some time.
-        stand = Gait("standing", passes.parameters, state, none, 0.0, lasts, stride)
+        stand = Gait("standing", passes.parameters, state, none, 0.0, lasts, kind)
         self.gait: Gait = stand if walk is None else walk.gait
 
     def reset(self) -> None:
@@ -111,13 +111,14 @@ class CurvePlanner(Planner):
                 target = self.gait.state
             u = self.gait.controls if self._rests else controls(_STEEP, 0.0, 0.0)
             return Decision(u, np.array(target), True, True, False)
-        passes, end, stiffness, speed = self._passes, self.gait.state, 0.0, None
+        passes, end, stiffness = self._passes, self.gait.state, 0.0
+        speeds: list[float] = []
         if not self._rests:
             present = float(z[0])
-            speed = passes.between(present if target is None else float(target[0]), present)[0]
-        step, reached = passes.best_touchdown(z, angles, speed)
-        if not self._rests:
-            over = passes.at(passes.between(reached, reached)[0])
+            speeds = passes.between(present if target is None else float(target[0]), present)
+        step = passes.best_touchdown(z, angles, speeds)
+        if speeds:
+            over = passes.at(speeds[0] if step is None else step.speed)
             end, stiffness = over.vlo, over.stiffness
         angle, before = (_STEEP, passes.parameters.leg_stiffness) if step is None else step[:2]
         u = controls(angle, before, stiffness)
@@ -137,10 +138,13 @@ class CurvePlanner(Planner):
         """See :meth:`~.planner.Planner.curve`."""
         here = AUTOMATON.node(node)
         if here.edge(Event.REST) is not None:
-            stride, fits = self._rest(node, start, toes)
-            return replace(decision, feasible=fits), stride
+            way, lands = self._way, self._lands or self._steps
+            feet = self._passes.feet((way * toes[0], way * toes[1]))
+            found = feet.to_rest(self._turned(start), lands)
+            stride = timed_stride(AUTOMATON, node, self._resting(feet, found.pieces), toes)
+            return replace(decision, feasible=feet.fits(found)), stride
         if self._steps:
-            return self._step(node, start, toes, decision, len(here.stance) == 1)
+            return self._step(node, start, toes, decision)
         feet = self._passes.feet(toes)
         found, over = self._away(feet, start, float(decision.predicted[0]))
         u = decision.controls.copy()
@@ -149,7 +153,9 @@ class CurvePlanner(Planner):
         second = self._passes.arriving(first.node, found.pieces[-1].end(), u, first.toes)
         speed = self._speed = float(over.vlo[0])
         slowest = self._passes.options.slowest
-        lasts = found.excess <= self._launch if self._lands else speed >= slowest
+        # A walk that falls back comes to rest first.
+        carried = start[0, 1] > 0.0 and found.excess <= self._launch
+        lasts = carried if self._lands else speed >= slowest
         chosen = replace(
             decision,
             controls=u,
@@ -170,26 +176,7 @@ class CurvePlanner(Planner):
             toes: the same.
             step: which it is.
         """
-        lifts = None
-        if len(AUTOMATON.node(node).stance) > 1:
-            on = np.zeros((2, TERMS))
-            on[:, :2] = start[:, :2]
-            lifts = timed_stride(AUTOMATON, node, [Quintic(on, _SOON)], toes)
-            node, toes = lifts.node, (float(lifts.toes[0]), float(lifts.toes[1]))
-            start = Quintic(on, _SOON).end()
-        end = np.array([[0.0, 0.0, 0.0], [self.gait.state[1], 0.0, 0.0]])
-        p = self._passes.parameters
-        height = max(float(start[1, 0]), _LOW * p.rest_length)  # of a robot that falls
-        rates = np.full(_CATCHING, np.sqrt(p.gravity / height))
-        pressures = np.full(_CATCHING, step.pressure)
-        lasts = np.full(_CATCHING, step.lasts / _CATCHING)
-        pieces = curve_over(start, end, lasts, pressures, rates)
-        over = timed_stride(AUTOMATON, node, pieces, (toes[0], np.nan))
-        both = toes[0], step.foothold
-        rests, fits = self._rest(over.node, pieces[-1].end(), both)
-        stride = chained(replace(over, toes=np.array(both)), rests)
-        decision = replace(settled(self.gait), feasible=fits)
-        return decision, stride if lifts is None else chained(lifts, stride)
+        return self._step(node, start, toes, settled(self.gait), step)
 
     def _away(
         self, feet: BetweenFeet, start: Array, wanted: float
@@ -202,7 +189,7 @@ class CurvePlanner(Planner):
         i, fails, holds = 0, 0, len(speeds)
         while i < holds:
             over = self._passes.at(speeds[i])
-            found, _ = feet.to_liftoff(start, shifted(over.way, feet.toes[1]), self._lands)
+            found = feet.to_liftoff(start, shifted(over.way, feet.toes[1]), self._lands)
             if feet.fits(found):
                 ways, holds = [(found, over)], i
             else:
@@ -212,14 +199,6 @@ class CurvePlanner(Planner):
             i = (fails + holds + 1) // 2
         return min(ways, key=lambda way: way[0].cost)
 
-    def _rest(self, node: str, start: Array, toes: tuple[float, float]) -> tuple[Stride, bool]:
-        """Both feet stand: to rest where one stands; whether there is a curve."""
-        feet, lands = self._passes.feet(self._turned_toes(toes)), self._lands or self._steps
-        found = feet.to_rest(self._turned(start), lands)
-        return timed_stride(AUTOMATON, node, self._resting(feet, found.pieces), toes), feet.fits(
-            found
-        )
-
     def _resting(self, feet: BetweenFeet, pieces: tuple[Quintic, ...]) -> list[Quintic]:
         """A curve to rest with some time in which the robot comes to it, in the world."""
         left = self._beat - (0.0 if self._steps else sum(piece.duration for piece in pieces))
@@ -228,37 +207,44 @@ class CurvePlanner(Planner):
         return self._back((*pieces, rest))
 
     def _step(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision, lifted: bool
+        self,
+        node: str,
+        start: Array,
+        toes: tuple[float, float],
+        decision: Decision,
+        catching: CatchingStep | None = None,
     ) -> tuple[Decision, Stride]:
-        """To rest by a step, over the foot that stays; it lifts off first, or is ``lifted``."""
+        """To rest by a step over the foot that stays; the other one lifts off first, or has."""
         way, passes, ahead = self._way, self._passes, self._turned(start)
-        stays, lifts = toes if lifted else toes[::-1] if way > 0.0 else toes
+        lifted = len(AUTOMATON.node(node).stance) == 1
+        lifts, stays = toes if way > 0.0 and not lifted else toes[::-1]
         feet = passes.feet((way * lifts, way * stays))
-        found = feet.by_step(ahead, lifted)
-        foothold = float(found.stages[-1, 5])
-        middle = (
-            feet.toes[1] if lifted else feet.place(PLACE) - 0.01 * passes.parameters.rest_length
-        )
-        fits = (lifted or found.excess <= self._launch) and passes.capture(ahead) > middle
-        *before, last = found.parts()
-        landed = passes.feet((feet.toes[1], foothold))
+        if catching is not None:
+            at, over = way * catching.foothold, way * catching.pressure
+            catching = catching._replace(foothold=at, pressure=over)
+        found, foothold = feet.by_step(ahead, lifted, catching)
         both = stays, way * foothold
-        strides = []
-        for pieces, on in zip(before[::-1], ((stays, np.nan), toes), strict=False):
-            strides.insert(0, (self._back(pieces), on))
-        strides.append((self._resting(landed, last), both))
-        stride = None
-        for pieces, on in strides:
-            part = timed_stride(AUTOMATON, node, pieces, on)
-            stride, node = part if stride is None else chained(stride, part), part.node
+        resting = self._resting(passes.feet((feet.toes[1], foothold)), found.parts[-1])
+        stride = timed_stride(
+            AUTOMATON, node, self._back(found.parts[0]), (stays, np.nan) if lifted else toes
+        )
+        for part in found.parts[1:-1]:
+            stride = chained(
+                stride, timed_stride(AUTOMATON, stride.node, self._back(part), (stays, np.nan))
+            )
+        stride = replace(stride, toes=np.array(both))
+        stride = chained(stride, timed_stride(AUTOMATON, stride.node, resting, both))
+        if catching is not None:
+            return replace(decision, feasible=feet.fits(found)), stride
+        behind = (
+            stays * way if lifted else feet.place(PLACE) - _BEHIND * passes.parameters.rest_length
+        )
+        fits = (lifted or found.excess <= self._launch) and passes.capture(ahead) > behind
         return replace(decision, feasible=fits), stride
 
     def _turned(self, state: Array) -> Array:
         """(2, 3) x and y with their derivatives, seen in the direction of the step."""
         return state * np.array([[self._way], [1.0]])
-
-    def _turned_toes(self, toes: tuple[float, float]) -> tuple[float, float]:
-        return self._way * toes[0], self._way * toes[1]
 
     def _back(self, pieces: tuple[Quintic, ...]) -> list[Quintic]:
         """The pieces of a curve, planned forward, in the world."""

@@ -33,10 +33,12 @@ UNLOADING = 0.06
 """Time over which a foot that is to lift off gives up its load [s, of the reference template]."""
 LIGHTEST = 0.05
 """Least load of the legs, over the weight: they do not pull."""
-MISSED = 5.0
-"""Excess that a metre counts as by which the end of a way is missed."""
-_ROUNDS = 30  # of the active set
-_HELD = 1e-9  # [m]: a bound that is nearer holds
+_ROUNDS, _HALVINGS = 40, 8  # of Newton's method, and of a step
+_SETTLED = 1e-9  # [m]
+# A metre by which an end is missed, made good all along a way of a duration T, moves the centre of
+# pressure by 1 m and this over (w T)^2.
+_LED = 6.0
+_DIRECTIONS = 9  # of x and x' / w at the end, in which an end may be out of reach
 # Largest w times the duration that is planned with, about twice that of a CoM that stays up. One
 # that falls diverges so fast that of the program nothing would be left but rounding.
 _GROWTH = 10.0
@@ -56,44 +58,40 @@ class Pieces(NamedTuple):
 def bounded(matrix: Array, right: Array, low: Array, high: Array, x: Array) -> None:
     """Write the x (n,) with the least x' matrix x / 2 - right' x between bounds.
 
-    By a primal-dual active set: the bounds that hold are guessed, the free part is solved for, and
-    what violates a bound, or is pulled away from it, changes sides. ``matrix`` (n, n) is positive
-    definite, so that few rounds suffice.
+    By Newton's method on what no bound holds, its steps cut at the bounds and halved until they
+    lead down. ``matrix`` (n, n) is positive definite, so that few rounds suffice.
     """
     n = x.shape[0]
-    side = np.zeros(n, np.int64)  # -1: at its lower bound, 1: at its upper one
-    work, part = np.empty((n, n)), np.empty(n)
+    work, slope, step, x[:] = np.empty((n, n)), np.empty(n), np.empty(n), low
     for _ in range(_ROUNDS):
         for i in range(n):
-            if side[i] == 0:
-                for j in range(n):
-                    work[i, j] = matrix[i, j] if side[j] == 0 else 0.0
-                part[i] = right[i]
-                for j in range(n):
-                    if side[j] != 0:
-                        part[i] -= matrix[i, j] * (low[j] if side[j] < 0 else high[j])
-            else:
-                for j in range(n):
-                    work[i, j] = 1.0 if i == j else 0.0
-                part[i] = low[i] if side[i] < 0 else high[i]
-        _solve(work, part)
-        changed = False
+            slope[i] = -right[i]
+            for j in range(n):
+                slope[i] += matrix[i, j] * x[j]
         for i in range(n):
-            x[i] = part[i]
-        for i in range(n):
-            if side[i] == 0:
-                new = -1 if x[i] < low[i] - _HELD else 1 if x[i] > high[i] + _HELD else 0
-            else:
-                pull = right[i]
+            held = x[i] <= low[i] if slope[i] > 0.0 else x[i] >= high[i]
+            step[i] = 0.0 if held else -slope[i]
+            for j in range(n):
+                work[i, j] = (1.0 if i == j else 0.0) if held else matrix[i, j]
+        # What a bound holds does not move.
+        _solve(work, step)
+        share, moved = 1.0, 0.0
+        for _ in range(_HALVINGS):
+            change = moved = 0.0
+            for i in range(n):
+                work[0, i] = min(max(x[i] + share * step[i], low[i]), high[i]) - x[i]
+                moved = max(moved, abs(work[0, i]))
+            for i in range(n):
+                change += slope[i] * work[0, i]
                 for j in range(n):
-                    pull -= matrix[i, j] * x[j]
-                new = side[i] if pull * side[i] > 0.0 else 0
-            if new != side[i]:
-                side[i], changed = new, True
-        if not changed:
+                    change += 0.5 * work[0, i] * matrix[i, j] * work[0, j]
+            if change <= 0.0:
+                break
+            share *= 0.5
+        for i in range(n):
+            x[i] += work[0, i]
+        if moved < _SETTLED:
             break
-    for i in range(n):
-        x[i] = min(max(x[i], low[i]), high[i])
 
 
 @compiled
@@ -160,10 +158,11 @@ def _response(pieces: Pieces, start: Array, end: Array, gain: Array, left: Array
 def _least_miss(pieces: Pieces, gain: Array, left: Array) -> float:
     """A miss that no p within its bounds can fall below [m]."""
     least = 0.0
-    for sign in (-1.0, 1.0):
-        low = high = -left[0] - sign * left[1]
+    for i in range(_DIRECTIONS):
+        share = 2.0 * i / (_DIRECTIONS - 1) - 1.0
+        low = high = -left[0] - share * left[1]
         for k in range(gain.shape[1]):
-            g = gain[0, k] + sign * gain[1, k]
+            g = gain[0, k] + share * gain[1, k]
             low += g * (pieces.low[k] if g > 0.0 else pieces.high[k])
             high += g * (pieces.high[k] if g > 0.0 else pieces.low[k])
         least = max(least, low, -high)
@@ -217,6 +216,7 @@ class Ground(NamedTuple):
     unloading: float  # time before a liftoff in which the foot gives up its load [s]
     smooth: float  # T [s]
     arrive: float  # R [s]
+    jumps: bool  # whether p may at once be anywhere
 
 
 class Ways(NamedTuple):
@@ -233,64 +233,73 @@ class Ways(NamedTuple):
 
 
 @compiled
+def _excess(
+    start: Array, ways: Ways, i: int, ground: Ground, pieces: Pieces, p: Array, most: float
+) -> float:
+    """Excess of the i-th way [m], and its ``p``; no more than a bound of it beyond ``most``."""
+    n, (across, along) = p.shape[0], ground.gravity
+    stages, end, rise = ways.stages[i], ways.ends[i], np.empty(TERMS)
+    count, time = n // stages.shape[0], 0.0
+    quintic(start[1], end[1], stages[:, 0].sum(), rise)
+    for k in range(n):
+        stage = stages[k // count]
+        dt, left = stage[0] / count, 1.0
+        # The acceleration at the end is that of the path after it.
+        y, _, lift = polynomial(rise, time + (0.5 if k < n - 1 else 1.0) * dt)
+        lift = max(across + lift, LIGHTEST * across)
+        pieces.duration[k] = dt
+        pieces.rate[k] = np.sqrt(lift / max(y, LIGHTEST * ground.reach))
+        if stage[6] > 0.0:
+            left = min((count - k % count - 1) * dt / ground.unloading, 1.0)
+        # On a slope the CoM is as over a centre of pressure further uphill.
+        uphill = along / pieces.rate[k] ** 2
+        pieces.low[k] = stage[5] + left * (stage[1] - stage[5]) + uphill
+        pieces.high[k] = stage[5] + left * (stage[2] - stage[5]) + uphill
+        pieces.wish[k] = stage[3] + uphill
+        time += dt
+    gain, missed = np.empty((2, n)), np.empty(2)
+    _response(pieces, start[0], end[0], gain, missed)
+    led = 1.0 + _LED / (pieces.rate[n - 1] * time) ** 2
+    excess = led * _least_miss(pieces, gain, missed)
+    if excess > most:
+        return excess
+    first = np.nan if ground.jumps else start[0, 0] - start[0, 2] / pieces.rate[0] ** 2
+    excess = led * _solved(pieces, gain, missed, first, (ground.smooth, ground.arrive), p)
+    x, v, time = start[0, 0], start[0, 1], 0.0
+    for k in range(n):
+        x, v = _after(x, v, pieces.rate[k], p[k], pieces.duration[k])
+        time += pieces.duration[k]
+        y, _, _ = polynomial(rise, time)
+        stage = stages[k // count]
+        away = max(abs(x - stage[4]), abs(x - stage[5]))
+        excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
+    return excess
+
+
+@compiled
 def best_way(
-    start: Array, ways: Ways, ground: Ground, jumps: bool, p: Array, rates: Array
+    start: Array, ways: Ways, ground: Ground, p: Array, rates: Array
 ) -> tuple[int, float, float]:
     """Number, cost and excess [m] of the best way from ``start`` (2, 3).
 
     The height is a quintic. The cost is the price and the excess beyond the slack: the miss of the
     end, or by how far a leg would be longer than its reach. A way within the slack is better than
-    any that is not. Where p ``jumps``, it may at once be anywhere. Centres of pressure ``p`` (k,)
-    and w ``rates`` (k,) are overwritten; each stage has as many pieces.
+    any that is not. Centres of pressure ``p`` (k,) and w ``rates`` (k,) are overwritten; each
+    stage has as many pieces.
     """
-    n, across, along = p.shape[0], ground.gravity[0], ground.gravity[1]
-    count = n // ways.stages.shape[1]
-    best, least, chosen, rise = np.inf, np.inf, 0, np.empty(TERMS)
-    pieces = Pieces(np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n))
-    found, gain, left = np.empty(n), np.empty((2, n)), np.empty(2)
-    shift = np.empty(n)
+    n = p.shape[0]
+    pieces = Pieces(np.empty(n), rates, np.empty(n), np.empty(n), np.empty(n))
+    best, chosen = np.inf, 0
     for i in range(ways.price.shape[0]):
-        quintic(start[1], ways.ends[i, 1], ways.stages[i, :, 0].sum(), rise)
-        time = 0.0
-        for k in range(n):
-            stage = ways.stages[i, k // count]
-            dt, open_ = stage[0] / count, 1.0
-            # The acceleration at the end is that of the path after it.
-            y, _, lift = polynomial(rise, time + (0.5 if k < n - 1 else 1.0) * dt)
-            lift = max(across + lift, LIGHTEST * across)
-            pieces.duration[k] = dt
-            pieces.rate[k] = np.sqrt(lift / max(y, LIGHTEST * ground.reach))
-            if stage[6] > 0.0:
-                open_ = min((count - k % count - 1) * dt / ground.unloading, 1.0)
-            # On a slope the CoM is as over a centre of pressure further uphill.
-            shift[k] = along / pieces.rate[k] ** 2
-            pieces.low[k] = stage[5] + open_ * (stage[1] - stage[5]) + shift[k]
-            pieces.high[k] = stage[5] + open_ * (stage[2] - stage[5]) + shift[k]
-            pieces.wish[k] = stage[3] + shift[k]
-            time += dt
-        _response(pieces, start[0], ways.ends[i, 0], gain, left)
-        if MISSED * _least_miss(pieces, gain, left) - ground.slack + ways.price[i] >= best:
+        if ways.price[i] >= best:
             continue
-        first = np.nan if jumps else start[0, 0] - start[0, 2] / pieces.rate[0] ** 2
-        prices = (ground.smooth, ground.arrive)
-        excess = MISSED * _solved(pieces, gain, left, first, prices, found)
-        x, v, time = start[0, 0], start[0, 1], 0.0
-        for k in range(n):
-            x, v = _after(x, v, pieces.rate[k], found[k], pieces.duration[k])
-            time += pieces.duration[k]
-            y, _, _ = polynomial(rise, time)
-            stage = ways.stages[i, k // count]
-            away = max(x - stage[4], stage[5] - x)
-            excess = max(excess, np.sqrt(away * away + y * y) - ground.reach)
-        cost = max(excess - ground.slack, 0.0) + ways.price[i]
-        fits = excess <= ground.slack
-        if fits or cost < best:
-            best, least, chosen = cost, excess, i
-            for k in range(n):
-                p[k], rates[k] = found[k], pieces.rate[k]
-        if fits:
-            break
-    return chosen, best, least
+        excess = _excess(start, ways, i, ground, pieces, p, ground.slack)
+        if excess <= ground.slack:
+            return i, ways.price[i], excess
+        if excess - ground.slack + ways.price[i] < best:
+            best, chosen = excess - ground.slack + ways.price[i], i
+    excess = _excess(start, ways, chosen, ground, pieces, p, np.inf)
+    return chosen, max(excess - ground.slack, 0.0) + ways.price[chosen], excess
 
 
 @compiled
@@ -346,10 +355,8 @@ def _from(polynomial: Array, time: float) -> Array:
 def plans() -> None:
     """A plan, and a curve's value, made to compile them."""
     states, one = np.ones((1, 2, 3)), np.ones(2)
-    ground = Ground((9.81, 0.0), 1.0, 0.0, UNLOADING, SMOOTH, ARRIVE)
-    best_way(
-        states[0], Ways(np.ones((1, 1, 7)), states, np.ones(1)), ground, False, one, one.copy()
-    )
+    ground = Ground((9.81, 0.0), 1.0, 0.0, UNLOADING, SMOOTH, ARRIVE, False)
+    best_way(states[0], Ways(np.ones((1, 1, 7)), states, np.ones(1)), ground, one, one.copy())
     polynomial(one, 1.0)
 
 
