@@ -8,6 +8,7 @@ one forward: all is planned forward, and turned round.
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 
 import numpy as np
 
@@ -79,7 +80,8 @@ class CurvePlanner(Planner):
         self._lands, self._rests = begin is not Event.REST, end is Event.REST
         self._passes, self._walk = passes, walk
         self._beat = BEAT * passes.scale.time
-        self._launch = _LAUNCH * passes.parameters.rest_length
+        length = passes.parameters.rest_length
+        self._launch, self._behind = _LAUNCH * length, _BEHIND * length
         self._speed = 0.0  # at VLO, to which the last curve leads [m/s]
         self._steps = stride in STEPS
         self._way = -1.0 if stride == StrideKind.STEP_BACK else 1.0
@@ -189,7 +191,9 @@ class CurvePlanner(Planner):
         i, fails, holds = 0, 0, len(speeds)
         while i < holds:
             over = self._passes.at(speeds[i])
-            found = feet.to_liftoff(start, shifted(over.way, feet.toes[1]), self._lands)
+            # From rest there is time to come to any of them.
+            ends = shifted(over.way if self._lands else over.way[::2], feet.toes[1])
+            found = feet.to_liftoff(start, ends, self._lands)
             if feet.fits(found):
                 ways, holds = [(found, over)], i
             else:
@@ -223,22 +227,18 @@ class CurvePlanner(Planner):
             at, over = way * catching.foothold, way * catching.pressure
             catching = catching._replace(foothold=at, pressure=over)
         found, foothold = feet.by_step(ahead, lifted, catching)
-        both = stays, way * foothold
         resting = self._resting(passes.feet((feet.toes[1], foothold)), found.parts[-1])
-        stride = timed_stride(
-            AUTOMATON, node, self._back(found.parts[0]), (stays, np.nan) if lifted else toes
-        )
-        for part in found.parts[1:-1]:
-            stride = chained(
-                stride, timed_stride(AUTOMATON, stride.node, self._back(part), (stays, np.nan))
-            )
-        stride = replace(stride, toes=np.array(both))
-        stride = chained(stride, timed_stride(AUTOMATON, stride.node, resting, both))
+        alone, both = (stays, np.nan), (stays, way * foothold)
+        parts = [*map(self._back, found.parts[:-1]), resting]
+        ground = (alone, both) if lifted else (toes, alone, both)
+        strides = []
+        for pieces, on in zip(parts, ground, strict=True):
+            strides.append(timed_stride(AUTOMATON, node, pieces, on))
+            node = strides[-1].node
+        stride = reduce(chained, strides)
         if catching is not None:
             return replace(decision, feasible=feet.fits(found)), stride
-        behind = (
-            stays * way if lifted else feet.place(PLACE) - _BEHIND * passes.parameters.rest_length
-        )
+        behind = feet.toes[1] if lifted else feet.place(PLACE) - self._behind
         fits = (lifted or found.excess <= self._launch) and passes.capture(ahead) > behind
         return replace(decision, feasible=fits), stride
 

@@ -33,8 +33,8 @@ UNLOADING = 0.06
 """Time over which a foot that is to lift off gives up its load [s, of the reference template]."""
 LIGHTEST = 0.05
 """Least load of the legs, over the weight: they do not pull."""
-_ROUNDS, _HALVINGS = 40, 8  # of Newton's method, and of a step
-_SETTLED = 1e-9  # [m]
+_ROUNDS = 100  # of the active set
+_PULL = 1e-9  # from a bound, which frees nothing
 # A metre by which an end is missed, made good all along a way of a duration T, moves the centre of
 # pressure by 1 m and this over (w T)^2.
 _LED = 6.0
@@ -58,39 +58,46 @@ class Pieces(NamedTuple):
 def bounded(matrix: Array, right: Array, low: Array, high: Array, x: Array) -> None:
     """Write the x (n,) with the least x' matrix x / 2 - right' x between bounds.
 
-    By Newton's method on what no bound holds, its steps cut at the bounds and halved until they
-    lead down. ``matrix`` (n, n) is positive definite, so that few rounds suffice.
+    By an active set: from the least without bounds, cut at them, to the least of what no bound
+    holds, or to the first bound on the way; there what is pulled away most from its bound is freed.
+    ``matrix`` (n, n) is positive definite.
     """
     n = x.shape[0]
-    work, slope, step, x[:] = np.empty((n, n)), np.empty(n), np.empty(n), low
+    side = np.zeros(n, np.int64)  # -1: at its lower bound, 1: at its upper one
+    work, slope, step = matrix.copy(), np.empty(n), np.empty(n)
+    for i in range(n):
+        x[i] = right[i]
+    _solve(work, x)
+    for i in range(n):
+        side[i] = -1 if x[i] <= low[i] else 1 if x[i] >= high[i] else 0
+        x[i] = min(max(x[i], low[i]), high[i])
     for _ in range(_ROUNDS):
         for i in range(n):
             slope[i] = -right[i]
             for j in range(n):
                 slope[i] += matrix[i, j] * x[j]
-        for i in range(n):
-            held = x[i] <= low[i] if slope[i] > 0.0 else x[i] >= high[i]
-            step[i] = 0.0 if held else -slope[i]
-            for j in range(n):
-                work[i, j] = (1.0 if i == j else 0.0) if held else matrix[i, j]
-        # What a bound holds does not move.
+                free = side[i] == 0 and side[j] == 0
+                work[i, j] = matrix[i, j] if free else 1.0 if i == j else 0.0
+            step[i] = -slope[i] if side[i] == 0 else 0.0
         _solve(work, step)
-        share, moved = 1.0, 0.0
-        for _ in range(_HALVINGS):
-            change = moved = 0.0
-            for i in range(n):
-                work[0, i] = min(max(x[i] + share * step[i], low[i]), high[i]) - x[i]
-                moved = max(moved, abs(work[0, i]))
-            for i in range(n):
-                change += slope[i] * work[0, i]
-                for j in range(n):
-                    change += 0.5 * work[0, i] * matrix[i, j] * work[0, j]
-            if change <= 0.0:
-                break
-            share *= 0.5
+        share, hit, most, freed = 1.0, -1, _PULL, -1
         for i in range(n):
-            x[i] += work[0, i]
-        if moved < _SETTLED:
+            bound = high[i] if step[i] > 0.0 else low[i]
+            if side[i] == 0 and share * abs(step[i]) > abs(bound - x[i]):
+                share, hit = (bound - x[i]) / step[i], i
+        for i in range(n):
+            x[i] += share * step[i]
+            pull = slope[i]
+            for j in range(n):
+                pull += matrix[i, j] * step[j]
+            if pull * side[i] > most:
+                most, freed = pull * side[i], i
+        if hit >= 0:
+            side[hit] = 1 if step[hit] > 0.0 else -1
+            x[hit] = high[hit] if step[hit] > 0.0 else low[hit]
+        elif freed >= 0:
+            side[freed] = 0
+        else:
             break
 
 
