@@ -26,7 +26,6 @@ from template_control.embedding.standing.pressure import (
     Ways,
     best_way,
     curve_over,
-    led_to,
 )
 from template_control.robot.start import Pose
 from template_control.slip.dynamics.timed import Quintic
@@ -184,11 +183,11 @@ class BetweenFeet:
 
         A front foot that has just landed (``lands``) takes up load at once.
         """
-        o, wanted, beyond = self.options, self.place(PLACE), self._beyond
+        o, wanted, half = self.options, self.place(PLACE), self._half
         if o.slant:  # as the CoM is held there
-            beyond = SOLE_SHARE * o.half_length + o.slant * abs(self.spacing), 0.0
+            half = SOLE_SHARE * o.half_length + o.slant * abs(self.spacing)
         times = _DURATIONS * self._scale.time
-        stages = _stage(times, self.toes, beyond, wanted)
+        stages = _stage(times, self.toes, half, wanted)
         return self._best(start, stages, self.at_rest(wanted)[None], self._price(times), lands)
 
     def to_liftoff(self, start: Array, ends: Array, lands: bool) -> Found:
@@ -213,7 +212,7 @@ class BetweenFeet:
             times = np.vstack((times, np.maximum(direct * _DIRECT[:, None], times.min())))
         ends = np.tile(ends, (len(times), 1, 1))
         times = times.ravel()
-        stages = _stage(times, self.toes, self._beyond, self.toes[1], lifts=1.0)
+        stages = _stage(times, self.toes, self._half, self.toes[1], lifts=1.0)
         return self._best(start, stages, ends, self._price(times), lands)
 
     def by_step(
@@ -245,14 +244,14 @@ class BetweenFeet:
             apart, spared = np.full(len(air), catching.foothold - stands), np.zeros(len(air))
         can = spared >= min(0.0, spared.max())
         both, air, rest, apart = both[can], air[can], rest[can], apart[can]
-        foot, beyond = stands + apart, self._beyond
+        foot, half = stands + apart, self._half
         middle = 0.5 * (stands + foot)
         feet = stands + spare * np.sign(apart), foot - spare * np.sign(apart)
         stages = np.concatenate(
             (
-                _stage(both, self.toes, beyond, stands, lifts=1.0),
-                _stage(air, (pressure, pressure), (0.0, 0.0), pressure),
-                _stage(rest, feet, beyond, middle),
+                _stage(both, self.toes, half, stands, lifts=1.0),
+                _stage(air, (pressure, pressure), 0.0, pressure),
+                _stage(rest, feet, half, middle),
             ),
             axis=1,
         )
@@ -267,10 +266,8 @@ class BetweenFeet:
         return found, float(foot[found.number])
 
     @property
-    def _beyond(self) -> tuple[float, float]:
-        """By how much the ground for a plan reaches beyond the middle of the feet, and them [m]."""
-        half = self.options.half_length
-        return _SHARE * half, 0.0
+    def _half(self) -> float:
+        return _SHARE * self.options.half_length
 
     def _price(self, lasts: Array) -> Array:
         """Of times on a curve [m]."""
@@ -286,15 +283,21 @@ class BetweenFeet:
         order = np.argsort(price, kind="stable")
         ways = Ways(stages, np.broadcast_to(ends, (len(price), 2, 3)), price)
         ways = Ways(*(column[order] for column in ways))
-        times = (time * unit.time for time in (UNLOADING, SMOOTH, _ARRIVE))
-        ground = Ground(p.gravity_parts, o.reach * p.rest_length, o.slack, *times, jumps)
+        ground = Ground(
+            gravity=p.gravity_parts,
+            reach=o.reach * p.rest_length,
+            slack=o.slack,
+            unloading=UNLOADING * unit.time,
+            smooth=SMOOTH * unit.time,
+            arrive=_ARRIVE * unit.time,
+            jumps=jumps,
+        )
         count = _PIECES if stages.shape[1] == 1 else _OF_STAGE
         pressures, rates = np.empty((2, count * stages.shape[1]))
         i, cost, excess = best_way(start, ways, ground, pressures, rates)
         lasts, end = np.repeat(ways.stages[i, :, 0] / count, count), ways.ends[i]
-        pieces = curve_over(start, end, lasts, pressures, rates)
-        if excess <= _LED * p.rest_length:
-            pieces = led_to(end, pieces, float(rates[-1]))
+        led = excess <= _LED * p.rest_length
+        pieces = curve_over(start, end, lasts, pressures, rates, led)
         parts = [pieces[k : k + count] for k in range(0, len(pieces), count)]
         return Found(parts, excess, cost, int(order[i]))
 
@@ -302,14 +305,14 @@ class BetweenFeet:
 def _stage(
     lasts: Array,
     feet: Sequence[Array | float],
-    beyond: tuple[float, float],
+    half: float,
     wish: Array | float,
     lifts: float = 0.0,
 ) -> Array:
-    """Stages (n, 1, 7) of :class:`Ways`, on ground that reaches ``beyond`` middle and feet [m]."""
-    (rear, front), (half, slack) = feet, beyond
+    """Stages (n, 1, 7) of :class:`Ways`, on the feet, and ``half`` around their middle."""
+    rear, front = feet
     middle = 0.5 * (np.asarray(rear) + front)
-    low = np.minimum(middle - half, np.minimum(rear, front) - slack)
-    high = np.maximum(middle + half, np.maximum(rear, front) + slack)
+    low = np.minimum(middle - half, np.minimum(rear, front))
+    high = np.maximum(middle + half, np.maximum(rear, front))
     columns = np.broadcast_arrays(lasts, low, high, wish, rear, front, lifts)
     return np.stack(columns, axis=-1)[:, None]

@@ -13,7 +13,7 @@ from template_control.embedding.standing.curves import CLOSING, BetweenFeet, Sta
 from template_control.embedding.standing.pressure import PRESSURE
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
-from template_control.slip.dynamics.stride import Stride, StrideSimulator, controls
+from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import GaitsBySpeed
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
@@ -74,7 +74,7 @@ class PassTable:
         ready(PRESSURE)
         self.parameters, self.options, self.family = parameters, options, family
         self.scale = Scale.of(parameters)
-        self._simulator = StrideSimulator(parameters, AUTOMATON)
+        self.simulator = StrideSimulator(parameters, AUTOMATON)
         # Uphill is downhill for one who walks back.
         self._back = StrideSimulator(replace(parameters, slope=-parameters.slope), AUTOMATON)
         self._node = AUTOMATON.start(StrideKind.WALK).name
@@ -100,14 +100,6 @@ class PassTable:
         (x, speed, _), y = state[0], state[1, 0]
         # A robot that falls may have its CoM below where its foot was to stand.
         return float(x + speed * np.sqrt(max(y, 0.0) / self.parameters.gravity))
-
-    def arriving(self, node: str, state: Array, u: Array, toes: Array) -> Stride:
-        """The template's stride from a node on.
-
-        ``state`` (2, 3) is the CoM's, ``u`` (NUM_SLOTS,) are controls, ``toes`` (2,) x of the rear
-        and the front foot [m].
-        """
-        return self._simulator.run(node, state[:, :2].T.ravel(), u, toes)
 
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].
@@ -140,7 +132,8 @@ class PassTable:
         # Whatever ends the stride: before it the leg pushes.
         longest = min(_LONGEST * self.scale.time, 0.98 * past.duration)
         times = np.linspace(self.options.single, longest, _APPROACHES)
-        return SingleSupportPass(vlo, stiffness, states_at(past, times) * _MIRROR)
+        states = past.sample(times).reshape(-1, 3, 2).swapaxes(1, 2)
+        return SingleSupportPass(vlo, stiffness, states * _MIRROR)
 
     def best_touchdown(
         self, z: Array, angles: tuple[float, float], speeds: Sequence[float] = ()
@@ -192,7 +185,7 @@ class PassTable:
         top = float(np.arcsin(min(z[1] / length, 1.0))) - 0.005
         angle = np.unique(np.clip(np.linspace(_FLATTEST, top, _ANGLES), *angles))
         u = controls(max(float(angle[0]) - _FLATTER, _FLAT), stiffness, stiffness)
-        stride = self._simulator.run(self._node, VLO.state(z), u)
+        stride = self.simulator.run(self._node, VLO.state(z), u)
         grid = np.linspace(0.0, min(stride.time_of(Event.TOUCHDOWN), stride.duration), _POINTS)
         levels = stride.sample(grid)[:, 1]
         sinks = int(levels.argmax())
@@ -209,15 +202,3 @@ class PassTable:
         same = np.full(len(angle), stiffness)
         found = np.stack((angle, same, x, y, v, toe, late), axis=-1)
         return found if len(lands) == 1 else found[(shortest <= toe) & (toe <= longest)]
-
-
-def shifted(states: Array, x: float) -> Array:
-    """The same states (n, 2, 3), ``x`` further ahead [m]."""
-    there = states.copy()
-    there[:, 0, 0] += x
-    return there
-
-
-def states_at(stride: Stride, times: Array) -> Array:
-    """(n, 2, 3) states of the CoM at times (n,) of a stride [s]."""
-    return stride.sample(times).reshape(-1, 3, 2).swapaxes(1, 2).copy()

@@ -28,7 +28,7 @@ from template_control.embedding.standing.curves import (
     Found,
     StandingOptions,
 )
-from template_control.embedding.standing.passes import PassTable, SingleSupportPass, shifted
+from template_control.embedding.standing.passes import PassTable, SingleSupportPass
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, controls
@@ -152,7 +152,8 @@ class CurvePlanner(Planner):
         u = decision.controls.copy()
         u[Slot.K_SD] = over.stiffness
         first = timed_stride(AUTOMATON, node, found.pieces, toes)
-        second = self._passes.arriving(first.node, found.pieces[-1].end(), u, first.toes)
+        liftoff = found.pieces[-1].end()[:, :2].T.ravel()
+        second = self._passes.simulator.run(first.node, liftoff, u, first.toes)
         speed = self._speed = float(over.vlo[0])
         slowest = self._passes.options.slowest
         # A walk that falls back comes to rest first.
@@ -184,7 +185,8 @@ class CurvePlanner(Planner):
         self, feet: BetweenFeet, start: Array, wanted: float
     ) -> tuple[Found, SingleSupportPass]:
         """Curve to a liftoff, with the first speed at VLO that there is a curve to."""
-        ways, present = [], float(start[0, 1])
+        ways, present, front = [], float(start[0, 1]), np.zeros((2, 3))
+        front[0, 0] = feet.toes[1]
         if not self._lands:
             wanted, present = max(wanted, self._passes.options.slowest), 0.0
         speeds = self._passes.between(wanted, present)
@@ -192,8 +194,8 @@ class CurvePlanner(Planner):
         while i < holds:
             over = self._passes.at(speeds[i])
             # From rest there is time to come to any of them.
-            ends = shifted(over.way if self._lands else over.way[::2], feet.toes[1])
-            found = feet.to_liftoff(start, ends, self._lands)
+            ends = over.way if self._lands else over.way[::2]
+            found = feet.to_liftoff(start, ends + front, self._lands)
             if feet.fits(found):
                 ways, holds = [(found, over)], i
             else:

@@ -149,12 +149,10 @@ def _response(pieces: Pieces, start: Array, end: Array, gain: Array, left: Array
     for k in range(n):
         pieces.rate[k] = min(pieces.rate[k], most)
         w, dt = pieces.rate[k], pieces.duration[k]
-        c, s = np.cosh(w * dt), np.sinh(w * dt)
         for j in range(k):
-            ahead, speed = gain[0, j], gain[1, j]
-            gain[0, j], gain[1, j] = c * ahead + s / w * speed, w * s * ahead + c * speed
-        gain[0, k], gain[1, k] = 1.0 - c, -w * s
-        x, v = c * x + s / w * v, w * s * x + c * v
+            gain[0, j], gain[1, j] = _after(gain[0, j], gain[1, j], w, 0.0, dt)
+        gain[0, k], gain[1, k] = _after(0.0, 0.0, w, 1.0, dt)
+        x, v = _after(x, v, w, 0.0, dt)
     last = pieces.rate[n - 1]
     for j in range(n):
         gain[1, j] /= last
@@ -317,46 +315,32 @@ def _after(x: float, v: float, w: float, p: float, dt: float) -> tuple[float, fl
 
 
 def curve_over(
-    start: Array, end: Array, durations: Array, pressures: Array, rates: Array
+    start: Array, end: Array, durations: Array, pressures: Array, rates: Array, led: bool
 ) -> tuple[Quintic, ...]:
     """The curve over centres of pressure (n,) [m], for ``durations`` (n,) [s] and w ``rates``.
 
-    Its height comes to that of ``end`` (2, 3); what x misses of it is left.
+    Where it is ``led``, what it misses of place and speed of its ``end`` (2, 3) is added smoothly;
+    its last centre of pressure stays.
     """
-    rise = Quintic.between(start, end, float(durations.sum())).coefficients[1]
-    (x, v), time, found = start[0, :2], 0.0, []
+    (x, v), ends, whole = start[0, :2].tolist(), [], float(durations.sum())
     for dt, p, w in zip(durations.tolist(), pressures, rates, strict=True):
-        c, begin = np.empty((2, TERMS)), np.array([x, v, w * w * (x - p)])
+        begin = x, v, w * w * (x - p)
         x, v = _after(x, v, w, p, dt)
-        quintic(begin, np.array([x, v, w * w * (x - p)]), dt, c[0])
-        c[1] = _from(rise, time)
-        found.append(Quintic(c, dt))
+        ends.append((dt, np.array((begin, (x, v, w * w * (x - p))))))
+    missed, w = end[0, :2] - (x, v), rates[-1]
+    missing = np.array((*missed, w * w * missed[0])) * led
+    added, rise, pieces, time = np.empty(TERMS), np.empty(TERMS), [], 0.0
+    quintic(np.zeros(3), missing, whole, added)
+    quintic(start[1], end[1], whole, rise)
+    for dt, ahead in ends:
+        c, times = np.empty((2, TERMS)), (time, time + dt)
+        ahead += [polynomial(added, t) for t in times]
+        up = np.array([polynomial(rise, t) for t in times])
+        quintic(ahead[0], ahead[1], dt, c[0])
+        quintic(up[0], up[1], dt, c[1])
+        pieces.append(Quintic(c, dt))
         time += dt
-    return tuple(found)
-
-
-def led_to(end: Array, pieces: tuple[Quintic, ...], rate: float) -> tuple[Quintic, ...]:
-    """A curve with what it misses of place and speed of its ``end`` (2, 3) added, smoothly.
-
-    Its last centre of pressure stays, by the last w, ``rate``.
-    """
-    missed, time, led = end - pieces[-1].end(), 0.0, []
-    missed[:, 2] = rate**2 * missed[:, 0]
-    whole = sum(piece.duration for piece in pieces)
-    added = Quintic.between(np.zeros((2, 3)), missed, whole).coefficients
-    for c, dt in pieces:
-        led.append(Quintic(c + [_from(one, time) for one in added], dt))
-        time += dt
-    return tuple(led)
-
-
-def _from(polynomial: Array, time: float) -> Array:
-    """The same polynomial (n,), its time counted from another one [s] on."""
-    c = polynomial.copy()
-    for i in range(len(c) - 1):
-        for k in range(len(c) - 2, i - 1, -1):
-            c[k] += time * c[k + 1]
-    return c
+    return tuple(pieces)
 
 
 def plans() -> None:

@@ -8,7 +8,7 @@ from template_control.embedding.com_path import leg_forces
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.curves import StandingOptions, standing_pose
-from template_control.embedding.standing.passes import PassTable, shifted
+from template_control.embedding.standing.passes import PassTable
 from template_control.embedding.standing.planners import BEAT, standing_planners
 from template_control.errors import ParameterError, ScenarioError
 from template_control.run.options import Push
@@ -154,7 +154,7 @@ def test_wider_feet_start_faster(planners):
 def test_the_approach_to_vlo_is_the_templates(passes):
     """From each of its states the template comes to that VLO."""
     over = passes.at(0.35)
-    for state in shifted(over.way, 0.5):
+    for state in over.way + [[0.5, 0.0, 0.0], [0.0, 0.0, 0.0]]:
         u = tc.slip.controls(1.4, over.stiffness, over.stiffness)
         stride = tc.simulate_stride(P, "SS_bv^w", state[:, :2].T.ravel(), u, (0.5, 0.5))
         np.testing.assert_allclose(VLO.of(stride.state), over.vlo, atol=1e-9)
