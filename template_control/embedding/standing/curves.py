@@ -124,6 +124,7 @@ _LOW = 0.3  # least height of the CoM that a step is planned with [m], over l0
 _PASSING = 2.0  # longest time to a foot that is passed, over that at the present speed
 # Of the ground under the feet that a plan uses: folding legs ask for a little more.
 _SHARE = 0.8
+_KEPT = 0.1  # share of the spacing that points keep ahead of the rear one at a start
 _STILL = 0.01  # over sqrt(g l0): a CoM that is faster does not begin at rest
 # For the reference template.
 _ARRIVE = 2e4  # R, what an error at the end costs [s]
@@ -137,7 +138,8 @@ _DIRECT = np.geomspace(0.8, 1.25, 8)
 # Of a step: times before the liftoff, in the air and after the touchdown.
 _LIFTS, _SWINGS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.05, 0.6, 9)
 _RESTS, _SOON = np.array([0.3, 0.6, 0.9]), np.array([1e-3])
-_NIMBLE = 1.8  # largest mean speed of a foot in the air [m/s]
+_NIMBLE = 1.8  # mean speed of a foot in the air that is liked [m/s]
+_HURRY = 0.3  # price of a metre that it cannot make with that
 _SPARE = 0.03  # distance of the centre of pressure from both feet after a touchdown [m]
 _NARROW = 0.02  # price of a metre between the feet beyond CLOSING
 _FARTHEST = 0.65  # foothold, ahead of the foot that stands [m]
@@ -213,6 +215,8 @@ class BetweenFeet:
         ends = np.tile(ends, (len(times), 1, 1))
         times = times.ravel()
         stages = _stage(times, self.toes, self._half, self.toes[1], lifts=1.0)
+        if not (lands or moves or self._half):
+            stages[:, :, 1] += _KEPT * self.spacing
         return self._best(start, stages, ends, self._price(times), lands)
 
     def by_step(
@@ -239,11 +243,11 @@ class BetweenFeet:
         closing, spare = CLOSING * length, _SPARE * length
         apart = np.maximum(np.maximum(capture + 2.0 * spare, com + 0.5 * closing), closing)
         apart = np.minimum(apart, _FARTHEST * length)
-        spared = _NIMBLE * self._scale.speed * air - apart - self.spacing
         if catching is not None:
-            apart, spared = np.full(len(air), catching.foothold - stands), np.zeros(len(air))
-        can = spared >= min(0.0, spared.max())
-        both, air, rest, apart = both[can], air[can], rest[can], apart[can]
+            apart = np.full(len(air), catching.foothold - stands)
+        late = np.maximum(
+            apart + self.spacing + 2.0 * spare - _NIMBLE * self._scale.speed * air, 0.0
+        )
         foot, half = stands + apart, self._half
         middle = 0.5 * (stands + foot)
         feet = stands + spare * np.sign(apart), foot - spare * np.sign(apart)
@@ -257,7 +261,7 @@ class BetweenFeet:
         )
         ends = np.repeat(self.at_rest(0.0)[None], len(foot), axis=0)
         ends[:, 0, 0] += middle
-        price = self._price(rest) + _NARROW * np.abs(apart - closing)
+        price = self._price(rest) + _NARROW * np.abs(apart - closing) + _HURRY * late
         if lifted:  # it is to come down
             stages, price = stages[:, 1:], price + _PACE * self._scale.speed * air
         else:
