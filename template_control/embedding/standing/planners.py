@@ -55,6 +55,7 @@ STEP_DURATION = 1.5
 _STILL = 0.1  # least time in which the CoM rests where its curve has led it [s]
 # How far behind the middle of the feet the capture point may be before a step, over l0.
 _BEHIND = 0.01
+_OFF = 0.1  # excess that counts as much as a speed at VLO which is off by 1 m/s [s]
 _STEEP = 1.4  # touchdown angle of a step that is not planned yet [rad]
 # Excess of a curve to a liftoff that is still followed, over l0: the QP keeps the centre of
 # pressure inside. Without a step the robot would fall.
@@ -203,7 +204,8 @@ class CurvePlanner(Planner):
                 if holds == len(speeds):
                     ways.append((found, over))
             i = (fails + holds + 1) // 2
-        return min(ways, key=lambda way: way[0].cost)
+        off = _OFF * self._passes.scale.time
+        return min(ways, key=lambda way: way[0].cost + off * abs(float(way[1].vlo[0]) - wanted))
 
     def _resting(self, feet: BetweenFeet, pieces: tuple[Quintic, ...]) -> list[Quintic]:
         """A curve to rest with some time in which the robot comes to it, in the world."""
