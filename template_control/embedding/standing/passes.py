@@ -35,7 +35,7 @@ _YIELDING = (1.0, 0.85, 0.7)  # stiffnesses tried, over that with which the leg 
 _STEPS = (0.15, 0.65)  # shortest and longest step, over l0
 _NARROW = 0.02  # price of a metre between the feet, more or less than CLOSING
 _SPARE = 0.06  # distance of the capture point from either foot at a touchdown before rest, over l0
-_MOVING = 0.03  # way of the CoM while the centre of pressure moves to the front foot, over l0
+_MOVING = 0.02  # way of the CoM while the centre of pressure moves to the front foot, over l0
 _OFF = 20.0  # price of a metre by which it would have to move sooner or later than it can
 # For the reference template.
 _LONGEST = 0.5  # way of the CoM in single stance before VLO [s]
