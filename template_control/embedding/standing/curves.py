@@ -137,7 +137,7 @@ _DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s]
 _DIRECT = np.geomspace(0.8, 1.25, 8)
 # Of a step: times before the liftoff, in the air and after the touchdown.
 _LIFTS, _SWINGS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.05, 0.6, 9)
-_RESTS, _SOON = np.array([0.3, 0.6, 0.9]), np.array([1e-3])
+_RESTS, _SOON = np.array([0.5, 0.7, 0.9]), np.array([1e-3])
 _NIMBLE = 1.8  # mean speed of a foot in the air that is liked [m/s]
 _HURRY = 0.3  # price of a metre that it cannot make with that
 _SPARE = 0.03  # distance of the centre of pressure from both feet after a touchdown [m]
