@@ -85,7 +85,8 @@ class CurvePlanner(Planner):
         self._launch, self._behind = _LAUNCH * length, _BEHIND * length
         self._speed = 0.0  # at VLO, to which the last curve leads [m/s]
         self._steps = stride in STEPS
-        self._way = -1.0 if stride == StrideKind.STEP_BACK else 1.0
+        back = AUTOMATON.start(stride).edge(Event.FRONT_LIFTOFF) is not None
+        self._way = -1.0 if back else 1.0
         lasts, kind = self._beat, StrideKind.STAND
         if self._steps:
             lasts, kind = STEP_DURATION * passes.scale.time, StrideKind(stride)
