@@ -15,7 +15,7 @@ from template_control.embedding.replanning import (
 )
 from template_control.embedding.state import TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
 from template_control.slip.control.stride_solver import rest
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.maps.return_map import new_workspace
@@ -72,6 +72,15 @@ def test_legs_push_longer_after_a_step_up(gait):
     assert not chosen.nominal, "nothing is learnt from it"
     k = chosen.controls[free] / gait.controls[free]
     assert np.all((k >= 0.5) & (k <= 2.0))
+
+
+def test_legs_without_stiffnesses_to_choose_stay_as_they_are(gait):
+    """The gait of a step from a stand has none: no springs carry it."""
+    ahead, none = landing(gait, -0.03), np.zeros(NUM_SLOTS)
+    decision = Decision(gait.controls, gait.vlo, True, True, True)
+    chosen = choose_legs(ahead, decision, gait.vlo, [Slot.K_SC], none, SCALE, lambda end: 1.0)
+    np.testing.assert_array_equal(chosen.controls, gait.controls)
+    np.testing.assert_allclose(chosen.predicted, ahead(gait.controls)[0])
 
 
 def test_after_a_step_down_the_legs_lead_where_the_next_step_can_brake(gait):

@@ -172,10 +172,10 @@ def solve_stride(
 
     The end is None where none of the controls that were tried completes the stride.
     """
-    slots, u = np.array(prior.slots), np.array(prior.controls)
+    slots, u = np.array(prior.slots, np.int64), np.array(prior.controls)
     base, change, lower, upper = prior.table
     chosen = [int(Slot.K_SD)] if stride.energy.chooses else []
-    columns = np.array([PADDED + slot for slot in (*prior.slots, *chosen)])
+    columns = PADDED + np.array([*prior.slots, *chosen], np.int64)
     problem = StrideProblem(
         stride=stride,
         aim=aim,
