@@ -17,7 +17,6 @@ from template_control.embedding.planners.gait_table import (
     CONTROL_TOLERANCE,
     CONTROLS,
     COST,
-    GAIN,
     SETTLING,
     SLOTS,
     STATE,
@@ -245,7 +244,7 @@ class AheadPlanner(Planner):
         slowest, fastest = self.limits.speeds
         aim = min(max(wanted, slowest), fastest)
         change = min(max(aim - present, -pace), pace)
-        aims = [present + share * change for share in _SHARES]
+        aims = list(dict.fromkeys(present + share * change for share in _SHARES))
         if begun is not None and begun.nominal:
             # The VLO from which the template would have come here has the speed that the legs'
             # swing adds for a while. A step goes on to where it went, as long as that is cheap.
@@ -305,7 +304,7 @@ class AheadPlanner(Planner):
         if steps not in self._problems:
             self._problems[steps] = new_problem(self._costs, steps)
         p, row = self._problems[steps], row_at(self.table, speed)
-        target = row[STATE:COST] + row[SETTLING:GAIN].reshape(-1, STATES) @ self.offset
+        target = row[STATE:COST] + row[SETTLING:STEP_DURATION].reshape(-1, STATES) @ self.offset
         p.start[:], p.offset[:] = z, self.offset
         states, free, stiffness, end, factor = p.reference
         end[:], factor[:] = target[:STATES], np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))

@@ -25,11 +25,9 @@ STIFFNESS, STATE, CONTROL = 0, 1, 4
 """Places in a row: k [N/m]; (3,) VLO state; (4,) alpha and shares of k."""
 COST, SETTLING = 8, 17
 """Places in a row: (3, 3) cost-to-go; (7, 3) shift of state and controls by an offset."""
-GAIN = 38
-"""Place in a row: (4, 3) gain of the LQR."""
-STEP_DURATION, STEP_LENGTH = 50, 51
+STEP_DURATION, STEP_LENGTH = 38, 39
 """Places in a row: duration [s] and length [m] of a step."""
-WIDTH = 52
+WIDTH = 40
 
 
 class GaitTable(NamedTuple):
@@ -119,7 +117,6 @@ def _rows(chain: Chain, p: SlipParameters) -> Array:
         row[STIFFNESS], row[STATE:CONTROL], row[CONTROL:COST] = k, z, u[SLOTS] / units
         row[STEP_LENGTH] = result[PADDED]
         row[STEP_DURATION] = row[STEP_LENGTH] / (chain.mean_speed[i] * unit)
-        row[SETTLING:GAIN] = settling_map(a, b, tolerance, CONTROL_WEIGHT).ravel()
-        cost, gain = lqr(a, b, q, r)
-        row[COST:SETTLING], row[GAIN:STEP_DURATION] = cost.ravel(), gain.ravel()
+        row[COST:SETTLING] = lqr(a, b, q, r)[0].ravel()
+        row[SETTLING:STEP_DURATION] = settling_map(a, b, tolerance, CONTROL_WEIGHT).ravel()
     return rows

@@ -103,8 +103,6 @@ class PlanProblem(NamedTuple):
     change: Array
     lower: Array
     upper: Array
-    usual: Array  # (3,) differences of states by which roughness is measured
-    small: Array  # (3,) changes of states over which it is
     z: Array  # (3,), and the next three: of the step at hand
     u: Array
     result: Array
@@ -127,8 +125,6 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         change=change,
         lower=np.full(size, -np.inf),
         upper=np.full(size, np.inf),
-        usual=STATE_TOLERANCE * costs.unit,
-        small=SMALL * costs.unit,
         z=np.empty(STATES),
         u=np.zeros(NUM_SLOTS),
         result=np.empty(RESULTS),
@@ -350,7 +346,7 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
     for k in range(STATES):
         at = p.z[k]
         for side in range(2):
-            change = (1.0 - 2.0 * side) * p.small[k]
+            change = (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
             p.z[k] = at + change
             outcome = one_stride(c.kernel, EXACT, p.z, p.u, p.work.scratch, p.result)
             p.z[k] = at
@@ -358,5 +354,5 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
                 return np.inf
             for j in range(STATES):
                 miss = p.result[j] - end[j] - p.jacobian[j, k] * change
-                worst = max(worst, abs(miss) / p.usual[j])
+                worst = max(worst, abs(miss) / (STATE_TOLERANCE[j] * c.unit[j]))
     return worst

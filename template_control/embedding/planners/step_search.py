@@ -15,6 +15,7 @@ import numpy as np
 from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
+from template_control.slip.control.least_squares import copy
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
@@ -75,16 +76,6 @@ class Law(NamedTuple):
     stiffness: float  # k0 [N/m]
     knee_load: KneeLoadPenalty
     kernel: Kernel  # the template's walking step
-
-
-@compiled
-def copy(source: Array, target: Array) -> None:
-    """Copy numbers (n,) into the first of ``target`` (m,).
-
-    A slice would take Numba seconds to compile, for what it says of wrong shapes.
-    """
-    for i in range(target.shape[0]):
-        target[i] = source[i]
 
 
 @compiled

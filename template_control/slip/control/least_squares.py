@@ -114,16 +114,19 @@ def _point(count: int, size: int) -> _Point:
 
 
 @compiled
-def _set(target: Array, source: Array) -> None:
-    """As ``target[:] = source`` (n,), which Numba compiles with texts about wrong shapes."""
+def copy(source: Array, target: Array) -> None:
+    """Copy numbers (n,) into the first of ``target`` (m,).
+
+    A slice would take Numba seconds to compile, for what it says of wrong shapes.
+    """
     for i in range(target.shape[0]):
         target[i] = source[i]
 
 
 @compiled
 def _copy(source: _Point, target: _Point) -> None:
-    _set(target.x, source.x)
-    _set(target.residual, source.residual)
+    copy(source.x, target.x)
+    copy(source.residual, target.residual)
     for r in range(source.rows.shape[0]):
         for i in range(source.rows.shape[1]):
             target.rows[r, i] = source.rows[r, i]
@@ -142,7 +145,7 @@ def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
         cost = evaluate(problem, there.x, there.residual)
         if cost < least:
             least = cost
-            _set(best.x, there.x)
+            copy(there.x, best.x)
     return least
 
 
@@ -155,7 +158,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
     """
     size = x.shape[0]
     here, best, there = _point(count, size), _point(count, size), _point(count, size)
-    _set(best.x, x)
+    copy(x, best.x)
     least = evaluate(problem, best.x, best.residual)
     if not least < np.inf:
         if not _from_grid(problem, search.grid, there, best) < np.inf:
@@ -169,7 +172,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
         longest, foreseen = 0.0, 0.0
         for i in range(size):
             longest = max(longest, abs(aim[i] - here.x[i]) / problem.change[i])
-        _set(there.x, aim)
+        copy(aim, there.x)
         for r in range(count):
             linear = here.residual[r]
             for i in range(size):
@@ -192,14 +195,14 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
             _copy(best, here)
             continue
         if known and last:
-            _set(best.x, there.x)
+            copy(there.x, best.x)
         if last:
             break
         slopes(problem, there.x, there.rows)
         _copy(there, here)
         if known:
             _copy(there, best)
-    _set(x, best.x)
+    copy(best.x, x)
     if not known:
         evaluate(problem, x, there.residual)
     return least
