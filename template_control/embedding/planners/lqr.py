@@ -29,7 +29,6 @@ from template_control.embedding.planners.step_search import (
     EFFORT,
     FALL_PRICE,
     SEARCH,
-    KneeLoadPenalty,
     Law,
     choose,
 )
@@ -264,11 +263,9 @@ class LqrPlanner(Planner):
             highest=p.rest_length + _FLIGHT * self._scale.length,
             earliest=min(o.earliest_touchdown, o.earliest_share * self.gait.step_duration),
             stiffness=p.leg_stiffness,
-            knee_load=KneeLoadPenalty(
-                KNEE_STRAIGHT * self._scale.length,
-                usual_knee_moment(p),
-                o.knee_load_price,
-            ),
+            knee_reach=KNEE_STRAIGHT * self._scale.length,
+            knee_moment=usual_knee_moment(p),
+            knee_price=o.knee_load_price,
             kernel=stride_kernel(p, self._here.stride),
         )
 

@@ -45,14 +45,6 @@ _WIDTHS = (0.16, 0.25)  # half-widths of the first finer grid in alpha [rad] and
 _NARROWING = 0.4  # half-widths of a finer grid over those of the one before, at most 0.5
 
 
-class KneeLoadPenalty(NamedTuple):
-    """Price of a step whose leg forces are more than a knee carries."""
-
-    reach: float  # length of the leg at which the knee is straight [m]
-    most: float  # moment of the leg force about the knee from which on a step costs more [N m]
-    price: float  # of a moment that is twice as much
-
-
 class Law(NamedTuple):
     """A bounded linear law u = u_s - K (z - z_s) and what its steps cost.
 
@@ -74,7 +66,9 @@ class Law(NamedTuple):
     highest: float  # a CoM that flies higher than this [m] has left the ground
     earliest: float  # the foot lands so long after VLO at the soonest [s]
     stiffness: float  # k0 [N/m]
-    knee_load: KneeLoadPenalty
+    knee_reach: float  # length of the leg at which the knee is straight [m]
+    knee_moment: float  # of the leg force about the knee from which on a step costs more [N m]
+    knee_price: float  # of a moment that is twice as much
     kernel: Kernel  # the template's walking step
 
 
@@ -151,10 +145,10 @@ def knee_load(law: Law, z: Array, u: Array, result: Array) -> float:
         length = result[4 + leg]
         # The rear leg has kappa_1 until the front one lands, and then kappa_p.
         k = max(u[1], u[u.shape[0] - 1]) if leg == 0 and u.shape[0] > 3 else u[1]
-        arm = 0.5 * np.sqrt(max(law.knee_load.reach**2 - length**2, 0.0))
-        excess = k * law.stiffness * (l0 - length) * arm / law.knee_load.most - 1.0
+        arm = 0.5 * np.sqrt(max(law.knee_reach**2 - length**2, 0.0))
+        excess = k * law.stiffness * (l0 - length) * arm / law.knee_moment - 1.0
         if excess > 0.0:
-            total += law.knee_load.price * excess**2
+            total += law.knee_price * excess**2
     return total
 
 
@@ -310,7 +304,9 @@ def chosen_step() -> None:
         highest=1.0,
         earliest=0.0,
         stiffness=template.leg_stiffness,
-        knee_load=KneeLoadPenalty(1.1, 350.0, 1.0),
+        knee_reach=1.1,
+        knee_moment=350.0,
+        knee_price=1.0,
         kernel=stride_kernel(template, StrideKind.WALK),
     )
     choose(law, new_scratch(), three, np.ones(3), np.empty(3))
