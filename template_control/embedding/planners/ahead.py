@@ -362,10 +362,8 @@ def plan_costs(parameters: SlipParameters, options: AheadOptions, knee_moment: f
 
 def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
-    problem, x = (
-        new_problem(plan_costs(SlipParameters(), AheadOptions(), np.inf), 1),
-        np.ones(CONTROLS),
-    )
+    problem = new_problem(plan_costs(SlipParameters(), AheadOptions(), np.inf), 1)
+    x = np.ones(CONTROLS)
     begin(problem, ANY_ANGLE, x)
     look_ahead(problem, SEARCH, x)
     roughness(problem, x, 0)

@@ -203,8 +203,8 @@ class LqrPlanner(Planner):
         self.a, self.b = vlo_jacobians(here)
         o = self.options
         self._costs = np.array([*o.control_cost, _PUSH_OFF_COST][: len(self._slots)])
-        costs = np.diag(o.state_cost), np.diag(self._costs)
-        self._cost, self._gain = lqr(self.a, self.b, *costs)
+        q, r = np.diag(o.state_cost), np.diag(self._costs)
+        self._cost, self._gain = lqr(self.a, self.b, q, r)
         # With push-off changes of the controls count more, the straighter the leg is at VLO.
         bend = 1.0 - here.vlo[1] / here.parameters.rest_length
         share = _STRAIGHT / bend if self._pushes else 0.0
@@ -247,7 +247,6 @@ class LqrPlanner(Planner):
         shift = self._shift = self._settled(shift)
         nominal, others = self._here.controls[slots] / self._units, len(slots) - 1
         steps = _SECOND_PUSH_OFF_STEPS if self._pushes else _SECOND_STEPS
-        relative_to = (nominal[0], *[0.0] * others)
         self._law = Law(
             target=self._here.vlo + shift[:3],
             control=nominal + shift[3:],
@@ -257,7 +256,7 @@ class LqrPlanner(Planner):
             lower=np.array([nominal[0] + ANGLE_RANGE[0], *[STIFFNESS_RANGE[0]] * others]),
             upper=np.array([nominal[0] + ANGLE_RANGE[1], *[STIFFNESS_RANGE[1]] * others]),
             slots=np.array(slots),
-            second_steps=np.add(np.array(steps).reshape(-1, len(slots)), relative_to),
+            second_steps=np.add(steps, (nominal[0], *[0.0] * others)),
             trusted_price=o.trusted_price,
             effort=EFFORT * self._costs,
             highest=p.rest_length + _FLIGHT * self._scale.length,
