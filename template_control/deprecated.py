@@ -24,6 +24,7 @@ DEPRECATED = {
     "template_control.embedding.SpeedChangePlanner": "template_control.embedding:CurvePlanner",
     "template_control.embedding.StandPlanner": "template_control.embedding:CurvePlanner",
     "template_control.embedding.StartPlanner": "template_control.embedding:CurvePlanner",
+    "template_control.embedding.StepPlanner": "template_control.embedding:CurvePlanner",
     "template_control.embedding.StopPlanner": "template_control.embedding:CurvePlanner",
     "template_control.load_free_robot": "template_control:load_floating_robot",
     "template_control.robot.FloatingBasePose": "template_control.robot:Pose",

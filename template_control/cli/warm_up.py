@@ -10,7 +10,7 @@ from template_control.embedding.planners.ahead import AHEAD
 from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.planners.modified import ModifiedPlanner
 from template_control.embedding.robot_template import paper_gait, template_for
-from template_control.embedding.standing.curves import STAND
+from template_control.embedding.standing.pressure import PRESSURE
 from template_control.embedding.tick import CONTROL
 from template_control.estimation.delay import DELAY
 from template_control.plant.bullet import READ
@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     ready((*CONTROL, *RECORD, *DELAY, *WALK))
     # These call the first ones; not each other, but for the floating base.
     others = (Part(scenarios, 1.0), Part(basins, 1.2), Part(ideal_plant, 1.8))
-    ready((*READ, *LATERAL, Part(floating_base, 13.0), *AHEAD, *STAND, *others))
+    ready((*READ, *LATERAL, Part(floating_base, 13.0), *AHEAD, *PRESSURE, *others))
     plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
     return 0
 

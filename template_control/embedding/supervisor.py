@@ -36,7 +36,7 @@ from template_control.embedding.replanning import (
     find_recovery,
 )
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners, TemplateRollout
-from template_control.embedding.standing.planners import StepPlanner
+from template_control.embedding.standing.planners import STEPS, CurvePlanner
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Node
@@ -344,7 +344,7 @@ class StrideSupervisor:
             kind = StrideKind.STEP_FORWARD if step.foot == sensed.feet[0] else StrideKind.STEP_BACK
             begins = self.automaton.starts[kind]
         planner = self.planners.get(kind)
-        if not isinstance(planner, StepPlanner):
+        if kind not in STEPS or not isinstance(planner, CurvePlanner):
             return None
         start = np.column_stack((sensed.state[:2], sensed.state[2:4], sensed.acceleration))
         toes = float(sensed.toes[0]), float(sensed.toes[1])

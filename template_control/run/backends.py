@@ -20,8 +20,7 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.robot_template import startable_slopes
-from template_control.embedding.standing.curves import standing_pose
-from template_control.embedding.standing.passes import CLOSING
+from template_control.embedding.standing.curves import CLOSING, standing_pose
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter

@@ -1,14 +1,13 @@
 """Curves of the CoM between two feet on the ground: to rest, or to where the rear foot lifts off.
 
-Over points, of the quintics tried that is taken which keeps the centre of pressure between the feet
-and the legs within their reach, and of those the quickest. Pairs of feet and soles bear a moment:
-the centre of pressure may be anywhere over the ground that they enclose, beyond the middle of
-either one too, and is planned by the quadratic program of :mod:`~.pressure`.
+The centre of pressure is planned by the quadratic program of :mod:`~.pressure`. It is anywhere
+between the feet; pairs of feet and soles, which bear a moment, have it beyond the middle of either
+one too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from math import hypot
@@ -19,26 +18,26 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
-from template_control.compiled import compiled
+from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.standing.pressure import (
-    ARRIVE,
-    LIGHTEST,
     SMOOTH,
     UNLOADING,
     Ground,
-    best_pressure,
+    Ways,
+    best_way,
     curve_over,
 )
 from template_control.robot.start import Pose
-from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial, quintic
+from template_control.slip.dynamics.timed import Quintic
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import STAND_HEIGHT
 from template_control.slip.similarity import LENGTH, SPEED, TIME, Scale, scaled, tuned
-from template_control.warm_up import Part
 from template_control.whole_body.solver import SOLE_SHARE
 
 SPACING = 0.3
 """Distance of the feet where a run begins, over l0."""
+CLOSING = 0.25
+"""Distance of the feet after a step from a stand, and where a walk ends, over l0."""
 PLACE = 0.5
 """Place of the CoM between the feet, as a share of their spacing from the rear one."""
 
@@ -103,102 +102,47 @@ def standing_pose(
     )
 
 
-_SAMPLES = 20  # of a curve, its start not counted
-
-
-@compiled
-def best_quintic(
-    starts: Array, ends: Array, durations: Array, ground: Ground, curve: Array
-) -> tuple[float, float, int, int]:
-    """Cost and excess [m] of the best quintic: excess beyond the slack, and time.
-
-    ``starts`` (m, 2, 3) and ``ends`` (n, 2, 3) are x and y, each position, velocity, acceleration;
-    ``durations`` (d,) are tried between each two [s]; ``curve`` (2, 6) is overwritten with
-    coefficients, constant term first. Also returns the numbers of the end and of the duration.
-    """
-    best, least, chosen, lasting = np.inf, np.inf, 0, 0
-    c = np.empty((2, TERMS))
-    for i in range(durations.shape[0]):
-        t = durations[i]
-        time = ground.pace * (t + ground.calm * ground.calm / t)
-        for s in range(starts.shape[0]):
-            for e in range(ends.shape[0]):
-                if time >= best:
-                    continue
-                for axis in range(2):
-                    quintic(starts[s, axis], ends[e, axis], t, c[axis])
-                excess = 0.0
-                for k in range(_SAMPLES + 1):
-                    excess = max(excess, _excess(c, t * k / _SAMPLES, ground))
-                    if excess - ground.slack + time >= best:
-                        break
-                cost = max(excess - ground.slack, 0.0) + time
-                if cost < best:
-                    best, least, chosen, lasting = cost, excess, e, i
-                    for axis in range(2):
-                        for n in range(TERMS):  # Numba compiles whole copies for seconds
-                            curve[axis, n] = c[axis, n]
-    return best, least, chosen, lasting
-
-
-@compiled
-def _excess(c: Array, t: float, ground: Ground) -> float:
-    """By how far a curve leaves the feet, or the legs' reach, at a time [m]."""
-    x = y = ax = ay = 0.0
-    for n in range(TERMS - 1, -1, -1):
-        x, y = x * t + c[0, n], y * t + c[1, n]
-    for n in range(TERMS - 1, 1, -1):
-        ax, ay = ax * t + n * (n - 1) * c[0, n], ay * t + n * (n - 1) * c[1, n]
-    across, along = ground.gravity
-    p = x - y * (ax + along) / max(across + ay, LIGHTEST * across)
-    away = max(x - ground.low, ground.high - x)
-    far = np.sqrt(away * away + y * y) - ground.reach
-    return float(max(ground.low - p, p - ground.high, far))
-
-
-def curves() -> None:
-    """The search, and a curve's value, called to compile them."""
-    states = np.ones((1, 2, 3))
-    ground = BetweenFeet((0.0, 1.0), SlipParameters(), StandingOptions()).ground
-    best_quintic(states, states, np.ones(1), ground, np.empty((2, TERMS)))
-    polynomial(np.ones(TERMS), 1.0)
-
-
-STAND = (Part(curves, 0.5),)
-"""Compiled functions of standing, starting and stopping."""
-
-
 class Found(NamedTuple):
     """The best curve found."""
 
-    pieces: tuple[Quintic, ...]  # in order
-    excess: float  # by how far the centre of pressure leaves the feet, or a leg its reach [m]
-    cost: float  # excess beyond the slack, and time [m]
+    parts: list[tuple[Quintic, ...]]  # its pieces, by stage
+    excess: float  # miss of its end, or by how far a leg leaves its reach [m]
+    cost: float  # excess beyond the slack, and its price [m]
+    number: int  # of the way
+
+    @property
+    def pieces(self) -> tuple[Quintic, ...]:
+        """Of all stages."""
+        return tuple(piece for part in self.parts for piece in part)
 
 
-_PEAK = 10.0 / np.sqrt(3.0)  # acceleration of a quintic from rest to rest, over distance / time^2
-_SHIFTS = (0.05, 0.15, 0.25, 0.35, 0.45)  # of the spacing: places from which a start may set off
-# Shares of the load that the front foot may take up at once where it has landed.
-_LOADS = (0.33, 0.67, 1.0)
+_PIECES = 20  # of a curve of one stage
+_OF_STAGE = 8  # of each of several
 _FALL = 0.5  # largest downward acceleration that a curve begins with, over g
-_MARGIN = 0.01  # of a rest place from either foot, over l0
-_REST_PLACES = 9  # that are tried
-_DURATIONS = 14  # that are tried, from the shortest to the longest
-# For the reference template.
-_SHORTEST, _LONGEST = 0.1, 1.2  # duration of a quintic [s]
-_CALM = 0.3  # duration that is liked best [s]
-_PACE = 0.002  # excess that a second more or less counts as [m/s]
-
-# Over feet that bear a moment.
-_PIECES = 20  # of a curve
+_LED = 0.05  # excess up to which a curve is led to its end, over l0
+_LOW = 0.3  # least height of the CoM that a step is planned with [m], over l0
 _PASSING = 2.0  # longest time to a foot that is passed, over that at the present speed
 # Of the ground under the feet that a plan uses: folding legs ask for a little more.
 _SHARE = 0.8
+_KEPT = 0.1  # share of the spacing that points keep ahead of the rear one at a start
 _STILL = 0.01  # over sqrt(g l0): a CoM that is faster does not begin at rest
-# Near its end a curve that is planned anew had better miss it by millimetres than swing back once
-# more.
-_PRESSURE_PACE = 0.01  # as _PACE
-_PRESSURE_DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s], for the reference template
+# For the reference template.
+_ARRIVE = 2e4  # R, what an error at the end costs [s]
+_CALM = 0.3  # duration that is liked best [s]
+# Excess that a second more or less counts as [m/s]. Near its end a curve that is planned anew had
+# better miss it by millimetres than swing back once more.
+_PACE = 0.01
+_DURATIONS = np.geomspace(0.03, 1.6, 14)  # that are tried [s]
+# Of the time to the liftoff at the mean of both speeds, tried where the CoM moves.
+_DIRECT = np.geomspace(0.8, 1.25, 8)
+# Of a step: times before the liftoff, in the air and after the touchdown.
+_LIFTS, _SWINGS = np.geomspace(0.03, 1.2, 8), np.geomspace(0.05, 0.6, 9)
+_RESTS, _SOON = np.array([0.5, 0.7, 0.9]), np.array([1e-3])
+_NIMBLE = 1.8  # mean speed of a foot in the air that is liked [m/s]
+_HURRY = 0.3  # price of a metre that it cannot make with that
+_SPARE = 0.03  # distance of the centre of pressure from both feet after a touchdown [m]
+_NARROW = 0.02  # price of a metre between the feet beyond CLOSING
+_FARTHEST = 0.65  # foothold, ahead of the foot that stands [m]
 
 
 @dataclass(frozen=True)
@@ -214,17 +158,12 @@ class BetweenFeet:
     options: StandingOptions
 
     def fits(self, found: Found) -> bool:
-        """True if a curve keeps the centre of pressure between the feet, but for the slack."""
+        """True if a curve leads to its end within the legs' reach, but for the slack."""
         return found.excess <= self.options.slack
 
     @cached_property
     def _scale(self) -> Scale:
         return Scale.of(self.parameters)
-
-    @property
-    def margin(self) -> float:
-        """Of a rest place from either foot [m]."""
-        return _MARGIN * self.parameters.rest_length
 
     @property
     def spacing(self) -> float:
@@ -241,160 +180,143 @@ class BetweenFeet:
         uphill = height * np.tan(self.parameters.slope)
         return np.array([[x + uphill, 0.0, 0.0], [height, 0.0, 0.0]])
 
-    @cached_property
-    def ground(self) -> Ground:
-        """The ground that points bear."""
-        o, unit = self.options, self._scale
-        return Ground(
-            rear=float(self.toes[0]),
-            front=float(self.toes[1]),
-            low=float(min(self.toes)),
-            high=float(max(self.toes)),
-            gravity=self.parameters.gravity_parts,
-            reach=o.reach * self.parameters.rest_length,
-            slack=o.slack,
-            pace=_PACE * unit.speed,
-            calm=_CALM * unit.time,
-            unloading=0.0,
-            smooth=SMOOTH * unit.time,
-            arrive=ARRIVE * unit.time,
-        )
-
-    def loaded(self, start: Array) -> Array:
-        """Starts (n, 2, 3), the given one first, that load the front foot at once.
-
-        The given one alone, where a robot that falls has its CoM on the ground: no leg bears it.
-        """
-        x, y = start[:, 0]
-        if y <= 0.0:
-            return start[None]
-        across, along = self.parameters.gravity_parts
-        lift = max(1.0 - _FALL, 1.0 + start[1, 2] / across) * across
-        starts = np.repeat(start[None], 1 + len(_LOADS), axis=0)
-        for i, share in enumerate(_LOADS, 1):
-            starts[i, 0, 2] = (x - self.place(share)) * lift / y - along
-        return starts
-
     def to_rest(self, start: Array, lands: bool = False) -> Found:
-        """Curve to rest where the centre of pressure allows, then to the place to stand.
+        """Curve to rest at the place to stand.
 
         A front foot that has just landed (``lands``) takes up load at once.
         """
-        wanted = self.place(PLACE)
-        if self.options.half_length:
-            return self._by_pressure(start, self.at_rest(wanted)[None], lands)[0]
-        margin = min(self.margin, 0.5 * abs(self.spacing))
-        low, high = self.ground.low + margin, self.ground.high - margin
-        places = np.append(np.linspace(low, high, _REST_PLACES), wanted)
-        starts = self.loaded(start) if lands else start
-        stop, i = self._best(starts, np.array([self.at_rest(x) for x in places]))
-        there, _ = self._best(starts, self.at_rest(wanted)[None])
-        if there.cost <= stop.cost + self.ground.pace * (_LONGEST * self._scale.time):
-            return there
-        return _joined(stop, self._shift(places[i], wanted))
-
-    def to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
-        """Curve to one of several states (n, 2, 3) of the rear foot's liftoff, and its number.
-
-        A front foot that has just landed (``lands``) takes up load at once; if none has, the CoM
-        may first move back, and rest there. The rear foot has no load left at the end.
-        """
-        if self.options.half_length:
-            return self._by_pressure_to_liftoff(start, ends, lands)
-        found, number = self._best(self.loaded(start) if lands else start, ends)
-        if lands or self.fits(found):
-            return found, number
-        for share in _SHIFTS:
-            rest = self.at_rest(self.place(share))
-            back, _ = self._best(start, rest[None])
-            away, i = self._best(rest, ends)
-            joined = _joined(back, away)
-            if joined.cost < found.cost:
-                found, number = joined, i
-        return found, number
-
-    def _best(self, start: Array, ends: Array) -> tuple[Found, int]:
-        """The best quintic to one of several ends (n, 2, 3), and its number.
-
-        There may be several starts (m, 2, 3).
-        """
-        unit = self._scale.time
-        durations = np.geomspace(_SHORTEST * unit, _LONGEST * unit, _DURATIONS)
-        curve = np.empty((2, TERMS))
-        starts = start.reshape(-1, 2, 3).copy()
-        # Where a foot lands late, the template has begun to fall.
-        starts[:, 1, 2] = np.maximum(starts[:, 1, 2], -_FALL * self.parameters.gravity)
-        cost, excess, end, i = best_quintic(starts, ends, durations, self.ground, curve)
-        return Found((Quintic(curve, float(durations[i])),), excess, cost), end
-
-    def _shift(self, start: float, end: float) -> Found:
-        """From rest to rest [m], within half of what the centre of pressure allows."""
-        room = 0.5 * min(abs(end - toe) for toe in self.toes) + self.options.slack
-        height = self.options.height / self.parameters.gravity
-        shortest = _SHORTEST * self._scale.time
-        time = float(max(np.sqrt(_PEAK * abs(end - start) * height / room), shortest))
-        curve = Quintic.between(self.at_rest(start), self.at_rest(end), time)
-        return Found((curve,), 0.0, self.ground.pace * time)
-
-    def _by_pressure_to_liftoff(self, start: Array, ends: Array, lands: bool) -> tuple[Found, int]:
-        (x, speed, _), (height, *_) = start.tolist()
-        rate = float(np.sqrt(self.parameters.gravity / max(height, self.margin)))
-        moves = speed > _STILL * self.parameters.speed_unit
-        # Once the capture point is past the foot that stays, the CoM is not thrown back again.
-        passes = moves and x + speed / rate > self.toes[1]
-        longest = _PASSING * max(self.toes[1] - x, 0.0) / speed if passes else np.inf
-        shortest = 0.0 if lands or moves else self.options.shift
-        return self._by_pressure(start, ends, lands, UNLOADING, (shortest, longest))
-
-    def _by_pressure(
-        self,
-        start: Array,
-        ends: Array,
-        lands: bool,
-        unloading: float = 0.0,
-        within: tuple[float, float] = (0.0, np.inf),
-    ) -> tuple[Found, int]:
-        """The best curve over feet that bear a moment to one of several ends, and its number.
-
-        It takes from ``within[0]`` to ``within[1]`` [s]; ``unloading`` is of the reference
-        template [s].
-        """
-        o, unit, points = self.options, self._scale, self.ground
-        middle, half = self.place(PLACE), _SHARE * o.half_length
-        if o.slant and not unloading:  # as the CoM is held there
+        o, wanted, half = self.options, self.place(PLACE), self._half
+        if o.slant:  # as the CoM is held there
             half = SOLE_SHARE * o.half_length + o.slant * abs(self.spacing)
-        ground = points._replace(
-            low=min(middle - half, points.low),
-            high=max(middle + half, points.high),
-            gravity=(self.parameters.gravity, 0.0),
-            pace=_PRESSURE_PACE * unit.speed,
-            unloading=unloading * unit.time,
+        times = _DURATIONS * self._scale.time
+        stages = _stage(times, self.toes, half, wanted)
+        return self._best(start, stages, self.at_rest(wanted)[None], self._price(times), lands)
+
+    def to_liftoff(self, start: Array, ends: Array, lands: bool) -> Found:
+        """Curve to one of several states (n, 2, 3) of the rear foot's liftoff.
+
+        A front foot that has just landed (``lands``) takes up load at once. The rear foot has no
+        load left at the end.
+        """
+        (x, speed, _), (height, *_) = start.tolist()
+        rate = np.sqrt(self.parameters.gravity / max(height, 0.01 * self.parameters.rest_length))
+        moves = speed > _STILL * self.parameters.speed_unit
+        times = _DURATIONS * self._scale.time
+        if moves and x + speed / rate > self.toes[1]:
+            # Once the capture point is past the foot that stays, the CoM is not thrown back again.
+            longest = _PASSING * max(self.toes[1] - x, 0.0) / speed
+            times = times[times <= max(longest, times[0])]
+        elif not (lands or moves):
+            times = np.unique(np.maximum(times, self.options.shift))
+        times = np.repeat(times[:, None], len(ends), axis=1)
+        if moves:  # there is little choice
+            direct = 2.0 * (ends[:, 0, 0] - x) / (speed + ends[:, 0, 1])
+            times = np.vstack((times, np.maximum(direct * _DIRECT[:, None], times.min())))
+        ends = np.tile(ends, (len(times), 1, 1))
+        times = times.ravel()
+        stages = _stage(times, self.toes, self._half, self.toes[1], lifts=1.0)
+        if not (lands or moves or self._half):
+            stages[:, :, 1] += _KEPT * self.spacing
+        return self._best(start, stages, ends, self._price(times), lands)
+
+    def by_step(
+        self, start: Array, lifted: bool, catching: CatchingStep | None = None
+    ) -> tuple[Found, float]:
+        """Curve to rest by a step of the rear foot ahead, and where it lands [m].
+
+        It lifts off, or is ``lifted``; ``catching`` may say when and where it lands, and over which
+        centre of pressure.
+        """
+        length, unit, (_, stands) = self._scale.length, self._scale.time, self.toes
+        lifts, swings, pressure = _LIFTS * unit, _SWINGS * unit, stands
+        if catching is not None:
+            lifts, swings, pressure = _SOON * unit, np.array([catching.lasts]), catching.pressure
+        tried = np.meshgrid(lifts[: 1 if lifted else None], swings, _RESTS * unit, indexing="ij")
+        both, air, rest = (times.ravel() for times in tried)
+        both *= not lifted
+        (x, speed, _), (y, *_) = start.tolist()
+        rate = np.sqrt(self.parameters.gravity / max(y, _LOW * length))
+        # Where the CoM and its capture point are at touchdown, over the foot that stands.
+        growth = np.exp(rate * (both + air))
+        capture = growth * (x - stands + speed / rate)
+        com = 0.5 * (capture + (x - stands - speed / rate) / growth)
+        closing, spare = CLOSING * length, _SPARE * length
+        apart = np.maximum(np.maximum(capture + 2.0 * spare, com + 0.5 * closing), closing)
+        apart = np.minimum(apart, _FARTHEST * length)
+        if catching is not None:
+            apart = np.full(len(air), catching.foothold - stands)
+        late = np.maximum(
+            apart + self.spacing + 2.0 * spare - _NIMBLE * self._scale.speed * air, 0.0
         )
-        p, rates = np.empty(_PIECES), np.empty(_PIECES)
-        shortest, longest = within
-        durations = _PRESSURE_DURATIONS * unit.time
-        durations = durations[durations <= max(longest, durations[0])]
-        durations = np.unique(np.maximum(durations, shortest))
-        cost, excess, end, i = best_pressure(start, ends, durations, ground, lands, p, rates)
-        curve = curve_over(start, ends[end], float(durations[i]), p, rates)
-        return Found(curve, excess, cost), end
+        foot, half = stands + apart, self._half
+        middle = 0.5 * (stands + foot)
+        feet = stands + spare * np.sign(apart), foot - spare * np.sign(apart)
+        stages = np.concatenate(
+            (
+                _stage(both, self.toes, half, stands, lifts=1.0),
+                _stage(air, (pressure, pressure), 0.0, pressure),
+                _stage(rest, feet, half, middle),
+            ),
+            axis=1,
+        )
+        ends = np.repeat(self.at_rest(0.0)[None], len(foot), axis=0)
+        ends[:, 0, 0] += middle
+        price = self._price(rest) + _NARROW * np.abs(apart - closing) + _HURRY * late
+        if lifted:  # it is to come down
+            stages, price = stages[:, 1:], price + _PACE * self._scale.speed * air
+        else:
+            price += self._price(both) + self._price(air)
+        found = self._best(start, stages, ends, price, False)
+        return found, float(foot[found.number])
+
+    @property
+    def _half(self) -> float:
+        return _SHARE * self.options.half_length
+
+    def _price(self, lasts: Array) -> Array:
+        """Of times on a curve [m]."""
+        unit = self._scale
+        return _PACE * unit.speed * (lasts + (_CALM * unit.time) ** 2 / lasts)
+
+    def _best(self, start: Array, stages: Array, ends: Array, price: Array, jumps: bool) -> Found:
+        """The best curve through (n, s, 7) stages of :class:`Ways` to ``ends`` (n, 2, 3)."""
+        o, unit, p = self.options, self._scale, self.parameters
+        start = start.copy()
+        # Where a foot lands late, the template has begun to fall.
+        start[1, 2] = max(start[1, 2], -_FALL * p.gravity)
+        order = np.argsort(price, kind="stable")
+        ways = Ways(stages, np.broadcast_to(ends, (len(price), 2, 3)), price)
+        ways = Ways(*(column[order] for column in ways))
+        ground = Ground(
+            gravity=p.gravity_parts,
+            reach=o.reach * p.rest_length,
+            slack=o.slack,
+            unloading=UNLOADING * unit.time,
+            smooth=SMOOTH * unit.time,
+            arrive=_ARRIVE * unit.time,
+            jumps=jumps,
+        )
+        count = _PIECES if stages.shape[1] == 1 else _OF_STAGE
+        pressures, rates = np.empty((2, count * stages.shape[1]))
+        i, cost, excess = best_way(start, ways, ground, pressures, rates)
+        lasts, end = np.repeat(ways.stages[i, :, 0] / count, count), ways.ends[i]
+        led = excess <= _LED * p.rest_length
+        pieces = curve_over(start, end, lasts, pressures, rates, led)
+        parts = [pieces[k : k + count] for k in range(0, len(pieces), count)]
+        return Found(parts, excess, cost, int(order[i]))
 
 
-def _joined(first: Found, second: Found) -> Found:
-    return Found(
-        first.pieces + second.pieces,
-        max(first.excess, second.excess),
-        first.cost + second.cost,
-    )
-
-
-def with_rest(pieces: tuple[Quintic, ...], duration: float) -> tuple[Quintic, ...]:
-    """A curve to rest, and some time in which the robot comes to it.
-
-    None is added where the duration [s] is not positive.
-    """
-    if duration <= 0.0:
-        return pieces
-    still = np.zeros_like(pieces[-1].coefficients)
-    still[:, 0] = pieces[-1].end()[:, 0]
-    return (*pieces, Quintic(still, duration))
+def _stage(
+    lasts: Array,
+    feet: Sequence[Array | float],
+    half: float,
+    wish: Array | float,
+    lifts: float = 0.0,
+) -> Array:
+    """Stages (n, 1, 7) of :class:`Ways`, on the feet, and ``half`` around their middle."""
+    rear, front = feet
+    middle = 0.5 * (np.asarray(rear) + front)
+    low = np.minimum(middle - half, np.minimum(rear, front))
+    high = np.maximum(middle + half, np.maximum(rear, front))
+    columns = np.broadcast_arrays(lasts, low, high, wish, rear, front, lifts)
+    return np.stack(columns, axis=-1)[:, None]

@@ -7,8 +7,8 @@ import template_control as tc
 from template_control.embedding.com_path import leg_forces
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
-from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
-from template_control.embedding.standing.passes import PassTable, shifted
+from template_control.embedding.standing.curves import StandingOptions, standing_pose
+from template_control.embedding.standing.passes import PassTable
 from template_control.embedding.standing.planners import BEAT, standing_planners
 from template_control.errors import ParameterError, ScenarioError
 from template_control.run.options import Push
@@ -59,15 +59,6 @@ def test_a_quintic_begins_and_ends_as_told():
         found = Quintic.between(start, end, duration)
         np.testing.assert_allclose([polynomial(c, 0.0) for c in found.coefficients], start)
         np.testing.assert_allclose(found.end(), end, atol=1e-12)
-
-
-def test_a_com_on_the_ground_loads_no_foot():
-    start = np.array([[0.1, 0.5, 0.0], [0.9, -2.0, 0.0]])
-    between = BetweenFeet((0.0, 0.4), P, OPTIONS)
-    assert len(between.loaded(start)) == 1 + 3
-    start[1, 0] = 0.0
-    with np.errstate(all="raise"):
-        np.testing.assert_array_equal(between.loaded(start), start[None])
 
 
 def test_forces_without_springs_carry_the_com_along_the_legs():
@@ -163,7 +154,7 @@ def test_wider_feet_start_faster(planners):
 def test_the_approach_to_vlo_is_the_templates(passes):
     """From each of its states the template comes to that VLO."""
     over = passes.at(0.35)
-    for state in shifted(over.way, 0.5):
+    for state in over.way + [[0.5, 0.0, 0.0], [0.0, 0.0, 0.0]]:
         u = tc.slip.controls(1.4, over.stiffness, over.stiffness)
         stride = tc.simulate_stride(P, "SS_bv^w", state[:, :2].T.ravel(), u, (0.5, 0.5))
         np.testing.assert_allclose(VLO.of(stride.state), over.vlo, atol=1e-9)

@@ -12,7 +12,8 @@ from template_control.embedding import (
 )
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.recovery import ways_to_rest
-from template_control.embedding.standing.passes import CLOSING, PassTable
+from template_control.embedding.standing.curves import CLOSING
+from template_control.embedding.standing.passes import PassTable
 from template_control.run.options import Push
 from template_control.slip import Event
 from template_control.slip.automaton.automaton import AUTOMATON
