@@ -19,6 +19,7 @@ OLD_NAMES = {
     "template_control.embedding.PricingPlanner",
     "template_control.embedding.rehearse",
     "template_control.embedding.SlopePlanner",
+    "template_control.embedding.StepPlanner",
     "template_control.embedding.SpeedChangePlanner",
     "template_control.embedding.StandPlanner",
     "template_control.embedding.StartPlanner",
