@@ -116,8 +116,9 @@ def test_five_link_walks_backward_and_forward_from_and_to_a_stand():
     record = tc.simulate(tc.Experiment.load(EXAMPLES / "zero_back_zero.toml"))
     assert not record.fell
     time, speed = record.time, record.com_velocity[:, 0]
-    assert speed[(time > 2.5) & (time < 5.0)].mean() == pytest.approx(-0.4, abs=0.02)
-    assert speed[(time > 9.0) & (time < 11.0)].mean() == pytest.approx(0.6, abs=0.05)
+    # Until the VLO at which it stops.
+    assert speed[(time > 2.5) & (time < 4.2)].mean() == pytest.approx(-0.4, abs=0.02)
+    assert speed[(time > 9.0) & (time < 10.2)].mean() == pytest.approx(0.6, abs=0.05)
     assert abs(speed[-1]) < 0.01
     # At a section dx/dt is along the way that the robot goes; template and feet are the world's.
     assert record.section_state[:, 0].min() > -0.01
@@ -128,7 +129,7 @@ def test_five_link_walks_backward_and_forward_from_and_to_a_stand():
 @pytest.mark.slow(seconds=6)
 def test_g1_walks_backward_and_to_the_left_from_and_to_a_stand():
     rows = ((0.0, 0.0, 0.0, 0.0), (0.2, -0.5, 0.05, 0.0), (6.0, 0.0, 0.0, 0.0))
-    motion = VelocityProfile(rows, duration=7.5, foreseen=False, gaits=("stand", "walk"))
+    motion = VelocityProfile(rows, duration=8.0, foreseen=False, gaits=("stand", "walk"))
     record = tc.simulate(tc.Experiment(tc.load_floating_robot("g1"), motion))
     assert isinstance(record, tc.run.FloatingRecord)
     assert not record.fell

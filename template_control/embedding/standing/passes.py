@@ -34,7 +34,7 @@ _STIFFNESS = (0.5, 4.0)  # least and greatest of the leg before touchdown, over 
 _YIELDING = (1.0, 0.85, 0.7)  # stiffnesses tried, over that with which the leg keeps its length
 _STEPS = (0.15, 0.65)  # shortest and longest step, over l0
 _NARROW = 0.02  # price of a metre between the feet, more or less than CLOSING
-_SPARE = 0.06  # distance of the capture point from either foot at a touchdown before rest, over l0
+_SPARE = 0.04  # distance of the capture point from either foot at a touchdown before rest, over l0
 _MOVING = 0.02  # way of the CoM while the centre of pressure moves to the front foot, over l0
 _OFF = 20.0  # price of a metre by which it would have to move sooner or later than it can
 # For the reference template.
@@ -170,7 +170,8 @@ class PassTable:
             price += self.scale.time * np.abs(after - speeds[0])
         else:
             capture = x - uphill + v / rate
-            price += np.maximum(_SPARE * length - np.minimum(d - capture, capture), 0.0)
+            spare = np.minimum(d - capture, capture) + self.options.half_length
+            price += np.maximum(_SPARE * length - spare, 0.0)
         at, i = np.unravel_index(price.argmin(), price.shape)
         speed = float(speeds[at]) if len(speeds) else 0.0
         return Touchdown(float(steps[i, 0]), float(steps[i, 1]), speed)

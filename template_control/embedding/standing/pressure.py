@@ -149,10 +149,14 @@ def _response(pieces: Pieces, start: Array, end: Array, gain: Array, left: Array
     for k in range(n):
         pieces.rate[k] = min(pieces.rate[k], most)
         w, dt = pieces.rate[k], pieces.duration[k]
+        c, s = np.cosh(w * dt), np.sinh(w * dt)
         for j in range(k):
-            gain[0, j], gain[1, j] = _after(gain[0, j], gain[1, j], w, 0.0, dt)
-        gain[0, k], gain[1, k] = _after(0.0, 0.0, w, 1.0, dt)
-        x, v = _after(x, v, w, 0.0, dt)
+            gain[0, j], gain[1, j] = (
+                c * gain[0, j] + s / w * gain[1, j],
+                w * s * gain[0, j] + c * gain[1, j],
+            )
+        gain[0, k], gain[1, k] = 1.0 - c, -w * s
+        x, v = c * x + s / w * v, w * s * x + c * v
     last = pieces.rate[n - 1]
     for j in range(n):
         gain[1, j] /= last
@@ -296,8 +300,6 @@ def best_way(
     pieces = Pieces(np.empty(n), rates, np.empty(n), np.empty(n), np.empty(n))
     best, chosen = np.inf, 0
     for i in range(ways.price.shape[0]):
-        if ways.price[i] >= best:
-            continue
         excess = _excess(start, ways, i, ground, pieces, p, ground.slack)
         if excess <= ground.slack:
             return i, ways.price[i], excess
