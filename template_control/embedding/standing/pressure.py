@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
+from template_control.cholesky import cholesky, solve_cholesky
 from template_control.compiled import compiled
 from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial, quintic
 from template_control.warm_up import Part
@@ -64,13 +65,14 @@ def bounded(matrix: Array, right: Array, low: Array, high: Array, x: Array) -> N
     """
     n = x.shape[0]
     side = np.zeros(n, np.int64)  # -1: at its lower bound, 1: at its upper one
-    work, slope, step = matrix.copy(), np.empty(n), np.empty(n)
+    work, slope, step = matrix.copy(), np.empty(n), np.empty((n, 1))
+    step[:, 0] = right
+    cholesky(work, n)
+    solve_cholesky(work, n, step)
     for i in range(n):
-        x[i] = right[i]
-    _solve(work, x)
-    for i in range(n):
-        side[i] = -1 if x[i] <= low[i] else 1 if x[i] >= high[i] else 0
-        x[i] = min(max(x[i], low[i]), high[i])
+        wish = step[i, 0]
+        side[i] = -1 if wish <= low[i] else 1 if wish >= high[i] else 0
+        x[i] = min(max(wish, low[i]), high[i])
     for _ in range(_ROUNDS):
         for i in range(n):
             slope[i] = -right[i]
@@ -78,48 +80,28 @@ def bounded(matrix: Array, right: Array, low: Array, high: Array, x: Array) -> N
                 slope[i] += matrix[i, j] * x[j]
                 free = side[i] == 0 and side[j] == 0
                 work[i, j] = matrix[i, j] if free else 1.0 if i == j else 0.0
-            step[i] = -slope[i] if side[i] == 0 else 0.0
-        _solve(work, step)
+            step[i, 0] = -slope[i] if side[i] == 0 else 0.0
+        cholesky(work, n)
+        solve_cholesky(work, n, step)
         share, hit, most, freed = 1.0, -1, _PULL, -1
         for i in range(n):
-            bound = high[i] if step[i] > 0.0 else low[i]
-            if side[i] == 0 and share * abs(step[i]) > abs(bound - x[i]):
-                share, hit = (bound - x[i]) / step[i], i
+            bound = high[i] if step[i, 0] > 0.0 else low[i]
+            if side[i] == 0 and share * abs(step[i, 0]) > abs(bound - x[i]):
+                share, hit = (bound - x[i]) / step[i, 0], i
         for i in range(n):
-            x[i] += share * step[i]
+            x[i] += share * step[i, 0]
             pull = slope[i]
             for j in range(n):
-                pull += matrix[i, j] * step[j]
+                pull += matrix[i, j] * step[j, 0]
             if pull * side[i] > most:
                 most, freed = pull * side[i], i
         if hit >= 0:
-            side[hit] = 1 if step[hit] > 0.0 else -1
-            x[hit] = high[hit] if step[hit] > 0.0 else low[hit]
+            side[hit] = 1 if step[hit, 0] > 0.0 else -1
+            x[hit] = high[hit] if step[hit, 0] > 0.0 else low[hit]
         elif freed >= 0:
             side[freed] = 0
         else:
             break
-
-
-@compiled
-def _solve(a: Array, b: Array) -> None:
-    """Overwrite ``b`` (n,) with the solution of a x = b, by elimination; ``a`` is overwritten.
-
-    No pivots are sought: ``a`` is positive definite but for rows of the unit matrix.
-    """
-    n = b.shape[0]
-    for k in range(n):
-        for i in range(k + 1, n):
-            if a[i, k] == 0.0:
-                continue
-            f = a[i, k] / a[k, k]
-            for j in range(k, n):
-                a[i, j] -= f * a[k, j]
-            b[i] -= f * b[k]
-    for i in range(n - 1, -1, -1):
-        for j in range(i + 1, n):
-            b[i] -= a[i, j] * b[j]
-        b[i] /= a[i, i]
 
 
 @compiled
