@@ -18,6 +18,8 @@ from typing import NamedTuple
 from template_control.compiled import cache_folder
 from template_control.terminal import plain_console
 
+ANNOUNCEMENT = "compiling once"
+"""Of a compilation, on the standard error."""
 _LOG = logging.getLogger("template_control")
 _MOST_PROCESSES = 4  # more would wait for the longest part
 _NOTICE = 1.0  # [s] of compilation that is not announced
@@ -105,7 +107,7 @@ class _Report:
             _LOG.info("compiling %d parts of the library once", len(self._parts))
         self._shown = True
         done = sum(part.seconds for part in self._parts if part.done)
-        text = "compiling once"
+        text = ANNOUNCEMENT
         if done:
             left = (time.monotonic() - self._begin) * (self._whole / done - 1.0)
             text += f": {done / self._whole:.0%}, about {left:.0f} s left"

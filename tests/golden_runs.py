@@ -1,4 +1,4 @@
-"""Golden runs: twelve short runs whose results a change of the code must keep.
+"""Golden runs: fourteen short runs whose results a change of the code must keep.
 
 ``python tests/golden_runs.py compare OLD NEW`` runs them on two commits on this machine and demands
 equal bits. ``tests/system/test_golden.py`` compares with files, within tolerances: other processors
@@ -34,6 +34,8 @@ COMMANDS = {
     "estimate": "walk --steps 6 --estimate",
     "floating_bolt": "walk --robot bolt --free --speed 0.6 --steps 8 --turn 0.2",
     "floating_five_link_3d": "walk --robot five-link-3d --free --steps 6",
+    "soles_g1": "walk --robot g1 --floating-base --from-stand --to-stand --steps 2",
+    "pairs_go2": "walk --robot go2 --floating-base --steps 8",
 }
 SAMPLED = ("q", "v", "torque", "contact_force")
 BY_SECTION = ("section_time", "section_state", "section_controls")

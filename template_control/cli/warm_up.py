@@ -72,8 +72,9 @@ def basins() -> None:
 
 
 def floating_base() -> None:
-    """A step of a robot with a floating base."""
-    simulate(Experiment(RobotSpec("five-link-3d", free=True), steps=1))
+    """A step of robots with a floating base: on points, on soles, and on pairs of feet."""
+    for name in ("five-link-3d", "g1", "go2"):
+        simulate(Experiment(RobotSpec(name, free=True), steps=1))
 
 
 def ideal_plant() -> None:

@@ -69,7 +69,7 @@ def branch_figure(
         axes.set(xlabel=label, ylabel=name)
     axes.axhline(1.0, color="0.4", linewidth=0.8)
     axes.set_ylim(0.0, min(3.0, max(1.1, 1.1 * largest.max())))
-    used = {p.special for p in points if p.special is not None}
+    used = list(dict.fromkeys(p.special for p in points if p.special is not None))
     marks = [
         axes.plot([], [], _MARKS[s], color="black", fillstyle="none", markersize=5)[0] for s in used
     ]

@@ -1,4 +1,4 @@
-"""Twelve short runs against files that keep them; see golden_runs.py."""
+"""Fourteen short runs against files that keep them; see golden_runs.py."""
 
 import golden_runs
 import numpy as np

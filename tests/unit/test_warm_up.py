@@ -72,7 +72,7 @@ def test_two_processes_share_the_parts_and_the_first_loads_all(prepare):
     for name, process in notes:
         by_process.setdefault(process, []).append(name)
     assert sorted(by_process.values()) == [["one", "one", "two"], ["two"]]
-    assert said.count("compiling once") == 1
+    assert said.count(warm_up.ANNOUNCEMENT) == 1
     # What is kept is not announced again.
     notes, said = prepare(2, "one")
     assert [name for name, _ in notes] == ["one"]

@@ -9,8 +9,9 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, lqr, settling_map
+from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, settling_map
 from template_control.slip.automaton.vocabulary import Slot, StrideKind
+from template_control.slip.control.lqr import lqr
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WALKING_SLOTS
 from template_control.slip.gaits.walking_by_speed import Chain, walking_by_speed

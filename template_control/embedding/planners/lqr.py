@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from scipy.linalg import solve_discrete_are
 
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
@@ -35,6 +34,7 @@ from template_control.embedding.planners.step_search import (
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search
+from template_control.slip.control.lqr import lqr
 from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
@@ -359,15 +359,6 @@ class LqrPlanner(Planner):
         limits = _SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
         self.offset = learnt(self.offset, surprise, self.options.offset_gain, limits)
         self._aim(self._shift)
-
-
-def lqr(a: Array, b: Array, q: Array, r: Array) -> tuple[Array, Array]:
-    """Cost-to-go P (n, n) and gain K (c, n) of u = -K z for z_next = A z + B u.
-
-    ``q`` (n, n) and ``r`` (c, c) are costs of z and u.
-    """
-    cost = solve_discrete_are(a, b, q, r)
-    return cost, np.linalg.solve(r + b.T @ cost @ b, b.T @ cost @ a)
 
 
 def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:

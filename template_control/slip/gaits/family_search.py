@@ -16,12 +16,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.linalg import LinAlgError, solve_discrete_are
+from scipy.linalg import LinAlgError
 
 from template_control.arrays import Array
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.control.lqr import lqr
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians, without_push_off
 from template_control.slip.gaits.walking_by_speed import Chain, coordinates, nearest_gait
@@ -65,10 +66,9 @@ def _controlled(a: Array, b: Array) -> float:
     """Largest absolute eigenvalue with the LQR, NaN where there is none."""
     costs = np.diag(_CONTROL_COST[: b.shape[1]])
     try:
-        ahead = np.asarray(solve_discrete_are(a, b, _STATE_COST, costs))
+        _, gain = lqr(a, b, _STATE_COST, costs)
     except (LinAlgError, ValueError):
         return np.nan
-    gain = np.linalg.solve(costs + b.T @ ahead @ b, b.T @ ahead @ a)
     return float(np.abs(np.linalg.eigvals(a - b @ gain)).max())
 
 
