@@ -34,7 +34,7 @@ COMMANDS = {
     "estimate": "walk --steps 6 --estimate",
     "floating_bolt": "walk --robot bolt --free --speed 0.6 --steps 8 --turn 0.2",
     "floating_five_link_3d": "walk --robot five-link-3d --free --steps 6",
-    "soles_g1": "walk --robot g1 --floating-base --from-stand --to-stand --steps 2",
+    "soles_g1": "walk --robot g1 --floating-base --steps 3",
     "pairs_go2": "walk --robot go2 --floating-base --steps 8",
 }
 SAMPLED = ("q", "v", "torque", "contact_force")
