@@ -59,7 +59,7 @@ _STRETCH = 0.903514524055713
 _SOLE_STRETCH = 0.95
 _LIFTED = 0.03  # shortest time on a pair of feet before VLO; the other has nothing to pass [s]
 _PASSED = 0.08  # the same on a sole: the other one, a step behind, swings past it [s]
-_SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles [s], for l0 = 1 m
+_SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles or pairs [s], for l0 = 1 m
 # dx/dt at VLO of a start [m/s], for l0 = 1 m. The step of G1 after a slow one takes a second, and
 # it falls sideways: in 8 of 12 starts at 0.13 to 0.21 m/s, and in none of 9 at 0.26 or more.
 _SLOWEST_START = 0.3
@@ -313,7 +313,7 @@ def standing_options(robot: Biped) -> StandingOptions:
     length = Scale.of(template_for(robot)).length
     half = robot.half_length / length
     if not robot.patches:
-        return StandingOptions(half_length=half, single=_LIFTED)
+        return StandingOptions(half_length=half, shift=_SHIFT, single=_LIFTED)
     slant = SOLE_SHARE * robot.half_width / (SOLE_STAND * length)
     return StandingOptions(
         half_length=half, slant=slant, shift=_SHIFT, single=_PASSED, slowest=_SLOWEST_START

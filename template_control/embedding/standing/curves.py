@@ -56,8 +56,8 @@ class StandingOptions(Checked):
         slant: of soles that stand next to each other, by how much of their spacing the ground that
             they enclose reaches further than that, on the line midway between them: their half
             width over the distance between them to the side. A stand uses it, a start does not.
-        shift: shortest time from rest to a liftoff [s]: until then the CoM of a robot on two soles
-            has to be over the one that stays.
+        shift: shortest time from rest to a liftoff [s]: until then the CoM of a robot on two soles,
+            or two pairs of feet, has to be over those that stay.
         single: shortest time on one leg before the VLO to which a start or a change of speed leads
             [s]: the other foot passes the one that stands.
         slowest: least speed at VLO that a start leads to [m/s]. From feet too close to each other
