@@ -7,7 +7,17 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions
-from template_control.embedding.standing.pressure import Pieces, bounded, pressure
+from template_control.embedding.standing.pressure import (
+    ARRIVE,
+    SMOOTH,
+    UNLOADING,
+    Ground,
+    Pieces,
+    Ways,
+    best_way,
+    bounded,
+    pressure,
+)
 from template_control.slip.dynamics.timed import polynomial
 from template_control.slip.parameters import SlipParameters
 
@@ -156,3 +166,33 @@ def test_a_start_leaves_time_to_shift_the_com_aside():
     assert lasts(0.0) < 0.8 <= lasts(0.8)
     assert lasts(0.8, speed=0.3) == lasts(0.0, speed=0.3), "it does not begin at rest"
     assert lasts(0.8, lands=True) == lasts(0.0, lands=True)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_the_cheapest_way_that_fits_comes_before_cheaper_ones_that_do_not(seed):
+    """Ways to rest between feet 0.3 m apart, of a CoM that moves, each tried by itself too."""
+    rng = np.random.default_rng(seed)
+    times, slack = np.geomspace(0.03, 1.6, 14), 0.005
+    price = np.sort(rng.uniform(0.0, 0.3, len(times)))
+    stages = np.array([[[t, 0.0, 0.3, 0.15, 0.0, 0.3, 0.0]] for t in rng.permutation(times)])
+    ends = np.tile([[0.15, 0.0, 0.0], [0.97, 0.0, 0.0]], (len(times), 1, 1))
+    ground = Ground((G, 0.0), 1.025, slack, UNLOADING, SMOOTH, 10.0 * ARRIVE, True)
+    fits = []
+    for speed in np.linspace(0.4, 0.9, 26):
+        start = np.array([[0.1, speed, 0.0], [0.96, -0.1, 0.0]])
+        alone = []
+        for i in range(len(times)):
+            p, rates = np.empty((2, 20))
+            one = Ways(stages[i : i + 1], ends[i : i + 1], price[i : i + 1])
+            alone.append(best_way(start, one, ground, p, rates)[2])
+        p, rates = np.empty((2, 20))
+        i, _, excess = best_way(start, Ways(stages, ends, price), ground, p, rates)
+        within = np.flatnonzero(np.array(alone) <= slack)
+        fits.append(len(within) > 0)
+        if fits[-1]:
+            assert i == within[0]
+            assert excess == alone[i]
+        else:
+            assert excess > slack
+    assert any(fits)
+    assert not all(fits)
