@@ -133,12 +133,9 @@ def _response(pieces: Pieces, start: Array, end: Array, gain: Array, left: Array
         w, dt = pieces.rate[k], pieces.duration[k]
         c, s = np.cosh(w * dt), np.sinh(w * dt)
         for j in range(k):
-            gain[0, j], gain[1, j] = (
-                c * gain[0, j] + s / w * gain[1, j],
-                w * s * gain[0, j] + c * gain[1, j],
-            )
-        gain[0, k], gain[1, k] = 1.0 - c, -w * s
-        x, v = c * x + s / w * v, w * s * x + c * v
+            gain[0, j], gain[1, j] = _carried(gain[0, j], gain[1, j], w, 0.0, c, s)
+        gain[0, k], gain[1, k] = _carried(0.0, 0.0, w, 1.0, c, s)
+        x, v = _carried(x, v, w, 0.0, c, s)
     last = pieces.rate[n - 1]
     for j in range(n):
         gain[1, j] /= last
@@ -294,7 +291,12 @@ def best_way(
 @compiled
 def _after(x: float, v: float, w: float, p: float, dt: float) -> tuple[float, float]:
     """Position and velocity after a piece."""
-    c, s = np.cosh(w * dt), np.sinh(w * dt)
+    return _carried(x, v, w, p, np.cosh(w * dt), np.sinh(w * dt))
+
+
+@compiled
+def _carried(x: float, v: float, w: float, p: float, c: float, s: float) -> tuple[float, float]:
+    """The same, with cosh and sinh of w dt."""
     return p + c * (x - p) + s / w * v, w * s * (x - p) + c * v
 
 
