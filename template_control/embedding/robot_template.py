@@ -278,8 +278,9 @@ def knee_torque(robot: Biped, gait: RunningGait) -> float:
 def walk_limits(robot: Biped) -> WalkLimits:
     """Limits of the walks that are planned several steps ahead for a robot.
 
-    The knees bear a share of their torque limit, and at most what five-link's do for its weight;
-    the speeds are those of :func:`walking_speeds`, or of the family where the robot has none.
+    The knees bear a share of their torque limit, and at most what five-link's do for its weight. A
+    straight leg swings through a radian along a quintic, with the hip's torque limit. The speeds
+    are those of :func:`walking_speeds`, or of the family where the robot has none.
 
     Args:
         robot: its last update is overwritten.
@@ -292,7 +293,16 @@ def walk_limits(robot: Biped) -> WalkLimits:
     except GaitError:
         speeds = family_speeds(p)
     slowest, fastest = (float(gait_for_speed(p, speed).vlo[0]) for speed in speeds)
-    return WalkLimits(min(moment, usual_knee_moment(p)), (slowest, fastest), not _heavy(robot))
+    template_for(robot)  # straight legs
+    joint = robot.hinges[0][0]
+    hip = robot.base_dof + joint
+    quickest = _QUINTIC_ACCELERATION * float(robot.mass_matrix[hip, hip])
+    return WalkLimits(
+        min(moment, usual_knee_moment(p)),
+        (slowest, fastest),
+        float(np.sqrt(quickest / robot.torque_limit[joint])),
+        not _heavy(robot),
+    )
 
 
 def _shortest_leg(gait: RunningGait) -> float:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
+from math import inf
 from typing import Annotated, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from template_control.embedding.recovery import Recovery
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
 from template_control.errors import ParameterError
 from template_control.slip.automaton.hybrid import Automaton, Node
+from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.control.stride_solver import StrideEnd, rest
 from template_control.slip.dynamics.stride import Stride, StrideSimulator
 from template_control.slip.maps.return_map import new_workspace
@@ -159,13 +161,15 @@ class RoutePlanners:
         estimators: EstimatorState,
         last: SectionReport | None,
         reached: Array | None = None,
+        lifted: float = inf,
     ) -> tuple[SectionReport, Array, bool]:
         """Learn from the stride that ended, ask the route for the next one, and plan it.
 
         ``z`` (n,) is the state at the section that was reached, at the time ``now`` [s];
         ``estimators`` are for the report, ``last`` is that of the stride that ended, None at the
-        start, and ``reached`` (n,) the state in that stride's axes, None: ``z``. Returns what was
-        decided, the section state from which its path starts, and whether the route goes on.
+        start, and ``reached`` (n,) the state in that stride's axes, None: ``z``. ``lifted`` is the
+        time since the swing foot has lifted off [s]. Returns what was decided, the section state
+        from which its path starts, and whether the route goes on.
         """
         begin = time.perf_counter()
         if last is not None:
@@ -176,11 +180,11 @@ class RoutePlanners:
         planner = self.of(goal)
         if last is not None and last.goal.stride != goal.stride:
             asked(planner.forget)
-        decision, start = self.plan(section, z, goal)
+        decision, start = self.plan(section, z, goal, lifted)
         instead = None if decision.feasible else self._instead(goal)
         if instead is not None:
             goal, planner = instead, self.of(instead)
-            decision, start = self.plan(section, z, goal)
+            decision, start = self.plan(section, z, goal, lifted)
         seconds = time.perf_counter() - begin
         report = SectionReport(
             time=now,
@@ -211,7 +215,9 @@ class RoutePlanners:
         """(3,) dx/dt, y, dy/dt where a goal leads to."""
         return self._sections(goal.stride)[1].padded(goal.target)
 
-    def plan(self, section: Section, z: Array, goal: StrideGoal) -> tuple[Decision, Array]:
+    def plan(
+        self, section: Section, z: Array, goal: StrideGoal, lifted: float
+    ) -> tuple[Decision, Array]:
         """A decision at ``z`` (n,), and the section state from which its path starts.
 
         The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's need
@@ -219,12 +225,13 @@ class RoutePlanners:
         from a state that does, and the robot is let down or pushed up to it.
         """
         planner = self.of(goal)
-        decision = decided(planner, Context(z, goal.target))
+        question = Context(z, goal.target, lifted=lifted)
+        decision = decided(planner, question)
         if decision.lasting:
             return decision, z
         for share in _CALMER:
             start = section.damped(z, share, _HIGHEST * self.route.parameters.rest_length)
-            damped = decided(planner, Context(start, goal.target))
+            damped = decided(planner, question._replace(z=start))
             if damped.lasting:  # from there; from here a run may be the better way
                 feasible = decision.feasible
                 return replace(damped, feasible=feasible, lasting=False, nominal=False), start
@@ -300,7 +307,7 @@ class TemplateRollout:
             section = section_of(self.automaton.sections(start)[1])
             z = section.of(last.state)
             then = self.planners.ahead(section, z, at) or self.planners.beyond(then, section)
-            context = Context(z, then.target, cause=Cause.FUTURE)
+            context = Context(z, then.target, cause=Cause.FUTURE, lifted=_lifted(last))
             ahead = decided(self.planners.of(then), context)
             whole = whole and ahead.lasting
             start = self.automaton.start(then.stride).name
@@ -356,6 +363,12 @@ class TemplateRollout:
             return None
         section = section_of(self.automaton.sections(before.name)[1])
         return section.mirror(section.of(past.state))
+
+
+def _lifted(stride: Stride) -> float:
+    """Time from the rear leg's liftoff to the end of a stride [s]; inf where there is none."""
+    times = [time for time, event, *_ in stride.events if event is Event.REAR_LIFTOFF]
+    return stride.duration - times[-1] if times else inf
 
 
 def _toes(sensed: TemplateState) -> tuple[float, float]:

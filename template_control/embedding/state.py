@@ -96,6 +96,8 @@ class TemplateState:
     state: Array = field(default_factory=lambda: np.zeros(4))
     toes: Array = field(default_factory=lambda: np.zeros(2))  # (2,) x of rear and front foot [m]
     feet: tuple[int, int] = (0, 1)  # the foot that is the rear leg's, and the front leg's
+    # (2,) time since each foot has lifted off [s], inf of one that stands
+    swung: Array = field(default_factory=lambda: np.full(2, np.inf))
     # (2,) wanted of the CoM at the last tick [m/s^2]: what is planned anew goes on with it
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
 
@@ -112,7 +114,9 @@ class StateObserver:
 
     def __init__(self, robot: Biped, feet: Feet, acceleration: Array, data: Any, mode: Any) -> None:
         self._robot, self._feet, self.data = robot, feet, data
-        self.now = TemplateState(data["state"][0], data["toes"][0], acceleration=acceleration)
+        self.now = TemplateState(
+            data["state"][0], data["toes"][0], swung=feet.swing_time, acceleration=acceleration
+        )
         self.pre_impact_velocity: Array = data["pre_impact_velocity"][0]
         self._terms = data[0], feet.data[0], robot.data[0], mode[0]
 

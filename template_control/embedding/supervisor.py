@@ -181,7 +181,10 @@ class StrideSupervisor:
         last = ended[-1] if ended else None
         if last is not None and reached is not None:
             z = self._rollout.at_section(section, sensed, last)
-        report, start, goes_on = self._planners.decide(section, z, now, estimators, last, reached)
+        swung = float(sensed.swung[sensed.feet[1]])
+        report, start, goes_on = self._planners.decide(
+            section, z, now, estimators, last, reached, swung
+        )
         self.log = ended
         self._begun, self.goal, self.decision = report, report.goal, report.decision
         self.arrived = self.arrived or not goes_on

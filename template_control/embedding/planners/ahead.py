@@ -10,7 +10,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
-from template_control.checks.ranges import NotNegative, Positive, Range
+from template_control.checks.ranges import Positive, Range
 from template_control.embedding.planners.gait_table import (
     COLUMNS,
     CONTROL,
@@ -33,6 +33,7 @@ from template_control.embedding.planners.look_ahead import (
     DEFECT,
     SEARCH,
     STATES,
+    TOO_SHORT,
     PlanCosts,
     PlanProblem,
     begin,
@@ -57,7 +58,7 @@ from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
-from template_control.slip.similarity import SPEED, TIME, Scale, scaled, tuned
+from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 from template_control.warm_up import Part, ready
 
 MOST_STEPS = 6
@@ -76,6 +77,9 @@ _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2,
 # Pace with heavy legs [m/s], for the reference template: with twice as much 2 of 10 random profiles
 # of rabbit ended in a fall, with changes of the table 5.
 _HEAVY_PACE = 0.15
+_EARLIEST = 0.09  # time from VLO to a touchdown at the least [s], for the reference template
+_SWING = 0.155  # time of five-link's swing at the least [s]
+_HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
 _BEHIND = 0.08  # of the wanted speed, that is none [m/s], for the reference
 _MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
 
@@ -96,7 +100,6 @@ class AheadOptions(Checked):
         cheap: cost of defects, limits and the last state up to which a plan is taken.
         ease: tolerances of the controls, over the usual ones.
         dearest: cost in all up to which a plan is taken; None: whatever it is.
-        earliest: a foot lands so long after VLO at the soonest [s].
     """
 
     kind: ClassVar[str] = "ahead"
@@ -107,20 +110,19 @@ class AheadOptions(Checked):
     cheap: Positive = tuned(20.0)
     ease: Positive = tuned(1.0)
     dearest: Positive | None = None
-    earliest: NotNegative = tuned(0.09, TIME)
 
 
-FREE_AHEAD = AheadOptions(pace=0.15, changes=0, ease=0.5, dearest=20.0, earliest=0.0)
+FREE_AHEAD = AheadOptions(pace=0.15, changes=0, ease=0.5, dearest=20.0)
 """Of a quadruped: the sideways motion is that of steps near a gait. Its VLO comes out a little off
 its plan's, most where its speed changes most: at 0.3 m/s a step dy/dt there was 0.07 m/s off, the
 next plan jumped to make up for it, and Go2 fell as it slowed down to its slowest walk. It comes to
 a stand no later.
 """
 
-BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09, earliest=0.12)
+BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09)
 """Of a biped with a floating base: of a gait that is further away no plan was cheap in the second
 step, and the search led G1 to a slow one and to a fall, or the foot, on its way down already, was
-wanted further ahead than Bolt's hips could take it. G1, slow and sinking, landed 0.06 s after VLO.
+wanted further ahead than Bolt's hips could take it.
 """
 
 
@@ -130,11 +132,13 @@ class WalkLimits(NamedTuple):
     Attributes:
         knee_moment: of the template's leg force about the knees [N m].
         speeds: least and greatest dx/dt at VLO of the gaits that are aimed at [m/s].
+        swing: time from a foot's liftoff to its touchdown at the least [s].
         light: whether its legs are light enough to change the speed within a few steps.
     """
 
     knee_moment: float
     speeds: tuple[float, float]
+    swing: float
     light: bool = True
 
 
@@ -164,7 +168,7 @@ class AheadPlanner(Planner):
         parameters: the template; its stiffness k0 counts for nothing, each gait has its own.
         options: tuning.
         speed: dx/dt at VLO of the gait that it is asked for first [m/s]; None: the range's middle.
-        limits: of the robot's walks (:func:`.walk_limits`); None: of five-link's knees, and the
+        limits: of the robot's walks (:func:`.walk_limits`); None: of five-link's legs, and the
             speeds of all gaits.
 
     Attributes:
@@ -190,11 +194,12 @@ class AheadPlanner(Planner):
         self._spacing = SPACING * scale.speed
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters)
-        self.limits = limits or WalkLimits(usual_knee_moment(parameters), self.speeds)
+        usual = usual_knee_moment(parameters), self.speeds, _SWING * scale.time
+        self.limits = limits or WalkLimits(*usual)
         if not self.limits.light:
             pace = min(o.pace, _HEAVY_PACE * scale.speed)
             o = self.options = replace(o, changes=0, pace=pace)
-        self._costs = plan_costs(parameters, o, self.limits.knee_moment)
+        self._costs = plan_costs(parameters, o, self.limits)
         self._problems: dict[int, PlanProblem] = {}
         self._changes = speed_changes(parameters)
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
@@ -237,21 +242,16 @@ class AheadPlanner(Planner):
 
         The decision is nominal where a plan was cheap, whatever was accepted.
         """
-        z, target, angles, _, begun = context
+        z, target, angles, _, begun, _ = context
         wanted = self._speed if target is None else float(target[0])
         (low, high), pace = self.speeds, self.options.pace
         present = min(max(float(z[0]), low), high)
         slowest, fastest = self.limits.speeds
         aim = min(max(wanted, slowest), fastest)
         change = min(max(aim - present, -pace), pace)
-        aims = list(dict.fromkeys(present + share * change for share in _SHARES))
-        if begun is not None and begun.nominal:
-            # The VLO from which the template would have come here has the speed that the legs'
-            # swing adds for a while. A step goes on to where it went, as long as that is cheap.
-            aims.insert(0, aim if begun.accepted is None else begun.accepted)
         rough, price = None, np.inf
         for goal, way in self._towards(z, aim):
-            plan = self._look(z, goal, angles, way)
+            plan = self._look(context, goal, change=way)
             if plan.excess > _BEARABLE or plan.cost > _DEAREST:
                 continue
             error = roughness(plan.problem, plan.x, 0)
@@ -259,9 +259,17 @@ class AheadPlanner(Planner):
                 return self._begin(plan, wanted)
             if rough is None or plan.cost + error**2 < price:
                 rough, price = plan, plan.cost + error**2
+        aims = list(dict.fromkeys(present + share * change for share in _SHARES))
+        begun_to = None
+        if begun is not None and begun.nominal:
+            # The VLO from which the template would have come here has the speed that the legs'
+            # swing adds for a while. A step goes on to where it went, as long as that is cheap.
+            begun_to = aim if begun.accepted is None else begun.accepted
+            aims.insert(0, begun_to)
         cheapest: _Plan | None = None
         for speed in aims:
-            plan = self._look(z, speed, angles)
+            hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
+            plan = self._look(context, speed, hopeless=hopeless)
             cheap = plan.excess <= self.options.cheap
             if cheap and plan.cost <= (self.options.dearest or np.inf):
                 error = 0.0 if rough is None else roughness(plan.problem, plan.x, 0)
@@ -294,10 +302,11 @@ class AheadPlanner(Planner):
 
     def _look(
         self,
-        z: Array,
+        context: Context,
         speed: float,
-        angles: tuple[float, float],
+        *,
         change: SpeedChange | None = None,
+        hopeless: float = np.inf,
     ) -> _Plan:
         """A plan to a speed, near a change of speed or near its gait."""
         steps = self.options.steps if change is None else len(change.controls)
@@ -305,16 +314,16 @@ class AheadPlanner(Planner):
             self._problems[steps] = new_problem(self._costs, steps)
         p, row = self._problems[steps], row_at(self.table, speed)
         target = row[STATE:COST] + row[SETTLING:STEP_DURATION].reshape(-1, STATES) @ self.offset
-        p.start[:], p.offset[:] = z, self.offset
+        p.start[:], p.offset[:], p.lifted[0] = context.z, self.offset, context.lifted
         states, free, stiffness, end, factor = p.reference
         end[:], factor[:] = target[:STATES], np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))
         if change is None:
             states[:], free[:], stiffness[:] = target[:STATES], target[STATES:], row[STIFFNESS]
         else:
             states[:], free[:], stiffness[:] = change.states[1:], change.controls, change.stiffness
-        x = np.empty(len(p.lower))
-        begin(p, (float(angles[0]), float(angles[1])), x)
-        cost, excess = look_ahead(p, SEARCH, x)
+        x, (least, most) = np.empty(len(p.lower)), context.angles
+        begin(p, (float(least), float(most)), x)
+        cost, excess = look_ahead(p, SEARCH._replace(hopeless=hopeless), x)
         u = np.zeros(NUM_SLOTS)
         u[SLOTS] = x[:CONTROLS]
         u[SLOTS[1:]] *= stiffness[0]
@@ -342,7 +351,7 @@ class AheadPlanner(Planner):
         self.offset = self._lqr.offset
 
 
-def plan_costs(parameters: SlipParameters, options: AheadOptions, knee_moment: float) -> PlanCosts:
+def plan_costs(parameters: SlipParameters, options: AheadOptions, limits: WalkLimits) -> PlanCosts:
     """Model and costs of the plans on a template; the options are scaled to it."""
     scale = Scale.of(parameters)
     beyond, tolerance = RISE
@@ -353,8 +362,10 @@ def plan_costs(parameters: SlipParameters, options: AheadOptions, knee_moment: f
         control_tolerance=options.ease * CONTROL_TOLERANCE,
         rise=(beyond * scale.speed, tolerance * scale.speed),
         knee_reach=KNEE_STRAIGHT * scale.length,
-        knee_moment=knee_moment,
-        earliest=options.earliest,
+        knee_moment=limits.knee_moment,
+        earliest=_EARLIEST * scale.time,
+        swing=limits.swing,
+        short=TOO_SHORT * scale.time,
         unit=scale.state,
         columns=COLUMNS,
     )
@@ -362,7 +373,9 @@ def plan_costs(parameters: SlipParameters, options: AheadOptions, knee_moment: f
 
 def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
-    problem = new_problem(plan_costs(SlipParameters(), AheadOptions(), np.inf), 1)
+    problem = new_problem(
+        plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0)), 1
+    )
     x = np.ones(CONTROLS)
     begin(problem, ANY_ANGLE, x)
     look_ahead(problem, SEARCH, x)

@@ -30,6 +30,7 @@ from template_control.embedding.planners.look_ahead import (
     BLOCK,
     DEFECT,
     STATES,
+    TOO_SHORT,
     PlanCosts,
     PlanProblem,
     begin,
@@ -45,6 +46,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.least_squares import Search
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.maps.return_map import LIFTED_TIME, ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.similarity import REFERENCE
 
@@ -56,6 +58,7 @@ MOST = 7
 _KNEE = 320.0  # moment that a knee bears [N m]
 _RISE = (0.15, 0.01)  # |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s]
 _EARLIEST = 0.1  # touchdown after VLO [s]: the swing leg passes the other one about then
+_SWING = 0.155  # time from a foot's liftoff to its touchdown [s]
 _DEFECT = 0.3  # differences between the steps, over those of a plan
 # Differences from the aimed speed, the gaits' height and level that cost 1.
 _TOLERANCE = np.array([32.0, 1.0, 6.0])
@@ -86,18 +89,26 @@ def costs() -> PlanCosts:
         knee_reach=KNEE_STRAIGHT,
         knee_moment=_KNEE,
         earliest=_EARLIEST,
+        swing=_SWING,
+        short=TOO_SHORT,
         unit=np.ones(STATES),
         columns=COLUMNS,
     )
+
+
+def _controls(free: Array, stiffness: float) -> Array:
+    """(NUM_SLOTS,) controls of a step; ``free`` (4,) holds shares of a stiffness [N/m]."""
+    u = np.zeros(NUM_SLOTS)
+    u[SLOTS] = free * [1.0, *[stiffness] * (CONTROLS - 1)]
+    return u
 
 
 def delay(change: SpeedChange) -> float:
     """Time that a change takes, weighted by the share of it that is left [s]."""
     speed, late = change.states[:, 0], 0.0
     for i, (free, k) in enumerate(zip(change.controls, change.stiffness, strict=True)):
-        u = np.zeros(NUM_SLOTS)
-        u[SLOTS] = free * [1.0, k, k, k]
-        stride = simulate_stride(REFERENCE, STRIDE_START[STRIDE], VLO.state(change.states[i]), u)
+        state, u = VLO.state(change.states[i]), _controls(free, k)
+        stride = simulate_stride(REFERENCE, STRIDE_START[STRIDE], state, u)
         left = speed[-1] - 0.5 * (speed[i] + speed[i + 1])
         late += stride.duration * abs(left)
     return float(late / abs(speed[-1] - speed[0]))
@@ -115,6 +126,8 @@ def find_change(
     r.states[:] = rows[1:, STATE : STATE + STATES]
     r.controls[:] = means[:, CONTROL : CONTROL + CONTROLS]
     r.stiffness[:] = means[:, STIFFNESS]
+    begins = _controls(rows[0, CONTROL : CONTROL + CONTROLS], float(rows[0, STIFFNESS]))
+    p.lifted[0] = ReturnMap(REFERENCE, STRIDE).evaluate(p.start, begins)[0][LIFTED_TIME]
     r.end[:], r.factor[:] = rows[-1, STATE : STATE + STATES], np.diag(1.0 / c.defect)
     x = np.empty(len(p.lower))
     begin(p, ANY_ANGLE, x)

@@ -6,7 +6,7 @@ z*, and the robot's offset d, the plan minimises
 
     sum |(P(z_i, u_i) + d - z_(i+1)) / defect|^2 + |(z_i - r_i) / tolerance|^2
     + |(u_i - v_i) / control tolerance|^2
-    + (rise beyond)^2 + (knee moments beyond)^2 + (touchdown too soon)^2
+    + (rise beyond)^2 + (knee moments beyond)^2 + (swing too short)^2
     + (P(z_(N-1), u_(N-1)) + d - z*)' C (P(z_(N-1), u_(N-1)) + d - z*)
 
 C is the LQR's cost-to-go of the gait aimed at.
@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled, inner_by_type
+from template_control.compiled import compiled, inner, inner_by_type
 from template_control.embedding.planners.gait_table import CONTROLS, SLOTS, STATE_TOLERANCE
 from template_control.embedding.planners.lqr import ANGLE_RANGE
 from template_control.embedding.planners.step_search import steepest
@@ -29,6 +29,8 @@ from template_control.slip.control.stride_solver import of_type
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
     EXACT,
+    LANDING_TIME,
+    LIFTED_TIME,
     REAR_BOTTOM,
     RESULTS,
     Derivatives,
@@ -51,18 +53,19 @@ _KNEES = 5
 _STATE, _CONTROL = STATES, 2 * STATES
 _RISE = _CONTROL + CONTROLS
 _KNEE = _RISE + 1
-_SOON = _KNEE + _KNEES
-PER_STEP = _SOON + 1
+_SHORT = _KNEE + _KNEES
+PER_STEP = _SHORT + 1
 """Residuals of a step: the defect, or the last end; states, controls, what rises beyond, what
 the knees bear beyond (the rear and the front leg at the virtual bottom, the rear leg just after
-touchdown, the stance leg at the VLO before and after), and what a foot lands too soon."""
+touchdown, the stance leg at the VLO before and after), and what the swing is too short."""
 _KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
-_SOON_TOLERANCE = 0.001  # height over l0 that a foot lands too high and costs 1
+TOO_SHORT = 0.004
+"""Time by which a swing is too short and costs 1 [s], for the reference."""
 DEFECT = np.array([0.004, 0.0008, 0.008])
 """Differences between a step's end and the next one's start that cost 1, for the reference."""
 SMALL = np.array([0.03, 0.003, 0.04])
 """Changes of a state over which a step is to be nearly linear, for the reference."""
-SEARCH = Search(rounds=12, close=0.03, grid=0, save=0.02, damping=1e-3)
+SEARCH = Search(rounds=8, close=0.03, grid=0, save=0.02, damping=1e-3)
 """Gauss-Newton steps of a plan."""
 
 
@@ -76,7 +79,9 @@ class PlanCosts(NamedTuple):
     rise: tuple[float, float]  # |dy/dt| that costs nothing, and what is beyond and costs 1 [m/s]
     knee_reach: float  # length of the leg at which the knee is straight [m]
     knee_moment: float  # of the leg force about the knee that costs nothing [N m]
-    earliest: float  # the foot lands so long after VLO at the soonest [s]
+    earliest: float  # time from VLO to the touchdown at the least [s]
+    swing: float  # the same from the foot's liftoff [s]
+    short: float  # time that one of them is too short and costs 1 [s]
     unit: Array  # (3,) of states, those of the reference template being 1
     columns: IntArray  # (7,) of the map's derivatives, states and controls
 
@@ -100,6 +105,8 @@ class PlanProblem(NamedTuple):
     reference: Reference
     ends: Array  # (N, 3) of the steps, overwritten
     lengths: Array  # (N, 5) of legs, where knees count [m], overwritten
+    lifted: Array  # (N + 1,) time from a liftoff to the VLO before each step and after the last [s]
+    landing: Array  # (N,) time from there to the touchdown [s], overwritten
     change: Array
     lower: Array
     upper: Array
@@ -122,6 +129,8 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         reference=Reference(states, controls, np.empty(steps), np.empty(STATES), square),
         ends=np.empty((steps, STATES)),
         lengths=np.empty((steps, _KNEES)),
+        lifted=np.full(steps + 1, np.inf),
+        landing=np.empty(steps),
         change=change,
         lower=np.full(size, -np.inf),
         upper=np.full(size, np.inf),
@@ -161,20 +170,10 @@ def knee_moment(p: PlanProblem, x: Array, i: int, leg: int) -> tuple[float, floa
     return force * arm, -kappa * arm - 0.25 * force * length / arm, stiff
 
 
-@compiled
-def landing_height(p: PlanProblem, x: Array, i: int) -> tuple[float, float, float]:
-    """Height at which a foot lands above that of the CoM at the earliest time for it [m].
-
-    That is l0 sin(alpha) - y(t), of which y comes from its Taylor series at VLO to the second
-    order. The step is loaded. Returns also its derivatives by y and by kappa_1.
-    """
-    c, kernel = p.costs, p.costs.kernel
-    share = 0.5 * c.earliest**2 / kernel.mass
-    kappa, short = x[BLOCK * i + 1] * p.reference.stiffness[i], kernel.rest_length - p.z[1]
-    fall = share * (kappa * short - kernel.mass * kernel.gravity)
-    later = p.z[1] + c.earliest * p.z[2] + fall
-    landing = kernel.rest_length * np.sin(x[BLOCK * i])
-    return landing - later, share * kappa - 1.0, -share * short
+@inner
+def too_short(p: PlanProblem, i: int) -> float:
+    """Time by which the swing that ends in step ``i``, or its part after VLO, is too short [s]."""
+    return max(p.costs.swing - p.lifted[i], p.costs.earliest) - p.landing[i]
 
 
 @inner_by_type(evaluate)
@@ -213,8 +212,8 @@ def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
             for leg in range(_KNEES):
                 beyond = knee_moment(p, x, i, leg)[0] / c.knee_moment - 1.0
                 residual[row + _KNEE + leg] = max(beyond, 0.0) / _KNEE_TOLERANCE
-            soon = landing_height(p, x, i)[0] / (_SOON_TOLERANCE * c.kernel.rest_length)
-            residual[row + _SOON] = max(soon, 0.0)
+            p.landing[i], p.lifted[i + 1] = p.result[LANDING_TIME], p.result[LIFTED_TIME]
+            residual[row + _SHORT] = max(too_short(p, i), 0.0) / c.short
         for r in range(PER_STEP * steps):
             total += residual[r] * residual[r]
         return total
@@ -263,15 +262,13 @@ def _plan_slopes(problem: Any, x: Any, rows: Any) -> Any:
                     if column == STATES + stiff:
                         slope += moment / x[first + stiff]
                     rows[row + _KNEE + leg, place] = slope / (_KNEE_TOLERANCE * c.knee_moment)
-            height, by_height, by_kappa = landing_height(p, x, i)
-            if height > 0.0:
-                length = c.kernel.rest_length
-                soon = _SOON_TOLERANCE * length
-                rows[row + _SOON, first] = length * np.cos(x[first]) / soon
-                rows[row + _SOON, first + 1] = by_kappa * reference.stiffness[i] / soon
-                if i > 0:
-                    rows[row + _SOON, first - 2] = by_height / soon
-                    rows[row + _SOON, first - 1] = -c.earliest / soon
+                if too_short(p, i) > 0.0:
+                    rows[row + _SHORT, place] = -p.jacobian[LANDING_TIME, column] * unit / c.short
+                # Where the whole swing is too short, it may also begin sooner.
+                later = not last and c.swing - p.lifted[i + 1] > c.earliest
+                if later and too_short(p, i + 1) > 0.0:
+                    slope = -p.jacobian[LIFTED_TIME, column] * unit / c.short
+                    rows[row + PER_STEP + _SHORT, place] = slope
             for j in range(CONTROLS):
                 rows[row + _CONTROL + j, first + j] = 1.0 / c.control_tolerance[j]
             if not last:

@@ -6,7 +6,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum, auto
-from math import isfinite, nan, pi
+from math import inf, isfinite, nan, pi
 from typing import Annotated, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -87,6 +87,7 @@ class Context(NamedTuple):
         angles: least and greatest touchdown angle that the swing foot can still reach [rad].
         cause: of the question.
         decision: what holds so far, within a stride.
+        lifted: time since the swing foot has lifted off [s]; inf: as long as it takes.
     """
 
     z: Array
@@ -94,6 +95,7 @@ class Context(NamedTuple):
     angles: tuple[float, float] = ANY_ANGLE
     cause: Cause = Cause.SECTION
     decision: Decision | None = None
+    lifted: float = inf
 
 
 class RestContext(NamedTuple):

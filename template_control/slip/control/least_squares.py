@@ -17,6 +17,7 @@ from template_control.compiled import compiled
 _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 _LESS = 0.1  # of the damping, after a step that does as foreseen; after a bad one as much more
 _TINY = 1e-300
+_SOME = 2  # rounds after which the cost says whether others are worth it
 _GOOD, _BAD = 0.75, 0.25  # shares of the foreseen change of the cost
 
 
@@ -27,6 +28,7 @@ class Search(NamedTuple):
     close: float = 0.03  # the last step's length in units of change: what it leaves is its square
     grid: int = 5  # points of each unknown that are tried where the start fails; 0: none
     save: float = 0.0  # share of the cost that a step has to save for another one
+    hopeless: float = np.inf  # cost after two rounds from which on no others follow
     # Damping after a bad step. Where equations weigh more than wishes, less of it stops the latter.
     damping: float = 1.0
     # Steps that may raise the cost, before they are taken back. Where targets are met by a curved
@@ -184,6 +186,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
             left -= 1
             last = last or left == 0 or least - cost < search.save * cost
             least = cost
+            last = last or (least > search.hopeless and search.rounds - left >= _SOME)
             if done > _GOOD:
                 damping = _LESS * damping if damping > _LESS else 0.0
             elif done < _BAD:

@@ -47,6 +47,7 @@ class Scratch(NamedTuple):
     state: Array
     toes: Array
     lengths: Array
+    times: Array
     stiffness: Array
     values: Array
     bends: Array
@@ -68,6 +69,7 @@ def new_scratch() -> Scratch:
         toes=np.zeros(2),
         # Of rear and front leg at the last (virtual) bottom, of the rear leg at touchdown [m].
         lengths=np.zeros(3),
+        times=np.zeros(2),  # since the section: of the touchdown, of the rear leg's liftoff [s]
         stiffness=np.zeros(2),  # of the phase's legs
         values=np.zeros((2, NUM_EVENTS)),  # the last three: see Watch
         bends=np.zeros(NUM_EVENTS),
@@ -97,6 +99,15 @@ def note_lengths(event: int, state: Array, toes: Array, lengths: Array) -> None:
             lengths[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
     elif event == Event.TOUCHDOWN:
         lengths[2] = np.sqrt((state[0] - toes[0]) ** 2 + state[1] ** 2)
+
+
+@inner
+def note_time(event: int, time: float, times: Array) -> None:
+    """Write the time of a touchdown or a rear leg's liftoff [s] into ``times`` of the scratch."""
+    if event == Event.TOUCHDOWN:
+        times[0] = time
+    elif event == Event.REAR_LIFTOFF:
+        times[1] = time
 
 
 @inner
@@ -170,6 +181,7 @@ def run_stride(
             events[row, 4 + i] = state[i]
         event_count += 1
         note_lengths(event, state, toes, scratch.lengths)
+        note_time(event, time, scratch.times)
         apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
         if outcome >= 0:
             return outcome, (target if target >= 0 else node), segments, event_count, time

@@ -38,6 +38,7 @@ class Tangents(NamedTuple):
     state: Array
     toes: Array
     lengths: Array
+    times: Array
     flow: Array
     leg: Array
     force: Array
@@ -54,6 +55,7 @@ def new_tangents() -> Tangents:
         toes=np.zeros((2, COLUMNS)),  # of the x of rear and front toe
         # Of rear and front leg at the (virtual) bottom, and of the rear leg at touchdown.
         lengths=np.zeros((3, COLUMNS)),
+        times=np.zeros((3, COLUMNS)),  # of the touchdown, the rear leg's liftoff, the last event
         flow=np.zeros((4, _INPUTS)),  # of a phase's final state by what it begins with
         # Series of a leg: r^2, r^-3, 1/r, d_x/r^3, d_x^2/r^3, d_x d_y/r^3.
         leg=np.zeros((6, ORDER - 1)),
@@ -215,6 +217,7 @@ def _fire(
         if c == _ALPHA:
             change += g[6] * rest_length * np.cos(alpha)
         time = -change / rate
+        tangents.times[2, c] += time
         for i in range(4):
             state[i, c] += at[2 + i] * time
     if event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
@@ -222,6 +225,10 @@ def _fire(
         _lengthen(1, 1, at, toes, tangents)
     elif event == Event.TOUCHDOWN:
         _lengthen(2, 0, at, toes, tangents)
+    note = 0 if event == Event.TOUCHDOWN else 1
+    if event in (Event.TOUCHDOWN, Event.REAR_LIFTOFF):
+        for c in range(COLUMNS):
+            tangents.times[note, c] = tangents.times[2, c]
 
 
 @inner
@@ -252,14 +259,17 @@ def stride_tangents(
 ) -> None:
     """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded in ``scratch``.
 
-    ``state``, ``toes`` and ``lengths`` of ``tangents`` are overwritten with the derivatives at the
-    stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the controls.
+    ``state``, ``toes``, ``lengths`` and ``times`` of ``tangents`` are overwritten with the
+    derivatives at the stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the
+    controls.
     """
     tables, alpha, rest_length = kernel.tables, controls[0], kernel.rest_length
     body = kernel.mass, rest_length
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
     tangents.lengths[:] = np.nan
+    tangents.times[:] = np.nan
+    tangents.times[2] = 0.0
     tangents.state[2, 0] = tangents.state[1, 1] = tangents.state[3, 2] = 1.0
     fired = 0
     for i in range(segments):

@@ -28,12 +28,15 @@ EXACT = np.int64(MapKind.EXACT)
 """The exact map, for compiled code."""
 _DIFFERENCE = 3e-6  # relative; leaves 1e-11 of the third derivative and 1e-9 of rounding
 
-RESULTS = 7
+RESULTS = 9
 """Numbers a map yields: dx/dt, y, dy/dt, distance covered, legs' lengths at the bottom, the rear
-leg's at touchdown."""
+leg's at touchdown; of the exact map also the times from the section to the touchdown, and from the
+rear leg's liftoff to the next section [s]."""
 
 REAR_BOTTOM, FRONT_BOTTOM, REAR_TOUCHDOWN = 4, 5, 6
 """Places of the legs' lengths among them."""
+LANDING_TIME, LIFTED_TIME = 7, 8
+"""Places of the times."""
 
 
 class MapWorkspace(NamedTuple):
@@ -64,14 +67,16 @@ def _begin(z: Array, scratch: Scratch) -> None:
     if z.shape[0] > PADDED:
         state[0], scratch.toes[0], scratch.toes[1] = z[3], z[4], z[5]
     scratch.lengths[0] = scratch.lengths[1] = scratch.lengths[2] = np.nan
+    scratch.times[0] = scratch.times[1] = np.nan
 
 
 @inner
-def _conclude(scratch: Scratch, result: Array) -> None:
-    """Write where a stride has ended into ``result`` (RESULTS,)."""
-    state, lengths = scratch.state, scratch.lengths
+def _conclude(scratch: Scratch, duration: float, result: Array) -> None:
+    """Write where a stride has ended, after ``duration`` [s], into ``result`` (RESULTS,)."""
+    state, lengths, times = scratch.state, scratch.lengths, scratch.times
     result[0], result[1], result[2], result[3] = state[2], state[1], state[3], state[0]
     result[4], result[5], result[6] = lengths[0], lengths[1], lengths[2]
+    result[7], result[8] = times[0], duration - times[1]
 
 
 @inner
@@ -92,10 +97,12 @@ def one_stride(
     _begin(z, scratch)
     if kind == EXACT:
         state, toes = scratch.state, scratch.toes
-        outcome = run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)[0]
+        ended = run_stride(kernel, state, toes, controls, _LAST_ONLY, scratch)
+        outcome, duration = ended[0], ended[4]
     else:
+        duration = np.nan
         outcome = closed_form_stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
-    _conclude(scratch, result)
+    _conclude(scratch, duration, result)
     return outcome
 
 
@@ -166,15 +173,17 @@ def section_jacobian(
     scratch, tangents = work
     _begin(z, scratch)
     ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
-    _conclude(scratch, found.result)
+    _conclude(scratch, ended[4], found.result)
     stride_tangents(kernel, controls, ended[2], ended[3], scratch, tangents)
     state, lengths, jacobian = tangents.state, tangents.lengths, found.jacobian
+    times = tangents.times
     for c in range(columns.shape[0]):
         j = columns[c]
         jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
         jacobian[3, c] = state[0, j]
         for leg in range(3):
             jacobian[4 + leg, c] = lengths[leg, j]
+        jacobian[7, c], jacobian[8, c] = times[0, j], times[2, j] - times[1, j]
     return ended[0]
 
 

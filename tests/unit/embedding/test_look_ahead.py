@@ -83,7 +83,8 @@ def table():
 
 def problem_from(z, speed, steps=3, **changes):
     """A plan that is to be near a gait, and its start."""
-    p = new_problem(plan_costs(P, OPTIONS, KNEES)._replace(**changes), steps)
+    limits = WalkLimits(KNEES, (0.2, 1.4), 0.155)
+    p = new_problem(plan_costs(P, OPTIONS, limits)._replace(**changes), steps)
     row = row_at(table(), speed)
     p.start[:], p.offset[:] = z, 0.0
     r = p.reference
@@ -102,10 +103,10 @@ def plan_from(z, speed, steps=3, search=SEARCH, **changes):
     return cost, excess, p, x
 
 
-def first_step(p, x):
-    """(6,) controls of a plan's first step."""
+def step_controls(p, x, i=0):
+    """(6,) controls of a plan's step."""
     u = np.zeros(NUM_SLOTS)
-    u[SLOTS] = x[:CONTROLS] * [1.0, *[p.reference.stiffness[0]] * 3]
+    u[SLOTS] = x[BLOCK * i :][:CONTROLS] * [1.0, *[p.reference.stiffness[i]] * 3]
     return u
 
 
@@ -134,7 +135,7 @@ def test_a_plan_is_where_its_cost_is_least(moment):
 def test_roughness_is_what_the_linear_map_misses(speed):
     row, step = row_at(table(), speed), ReturnMap(P, "wp")
     p, x = problem_from(row[STATE:CONTROL], speed)
-    z, u = p.start.copy(), first_step(p, x)
+    z, u = p.start.copy(), step_controls(p, x)
     here = step.linearise(z, u)
     misses = [
         step.evaluate(z + change, u)[0][:3] - here.state - here.state_jacobian @ change
@@ -179,18 +180,41 @@ def test_a_plan_stays_within_its_bounds(seed):
     assert controls[0, 0] <= np.arcsin(min(z[1], 1.0)) - TOP_MARGIN + 1e-12
 
 
-def test_a_foot_does_not_land_at_once():
+@pytest.mark.parametrize("lifted", [0.1, 0.2])
+def test_a_swing_has_its_time(lifted):
     """Slow and sinking at VLO, the CoM would else be at the height of a landing in 0.05 s."""
     z = row_at(table(), 0.3)[STATE:CONTROL] + [0.1, 0.0, -0.05]
     simulator, node = StrideSimulator(P, AUTOMATON), AUTOMATON.start("wp").name
 
-    def lands(**changes):
-        _, _, p, x = plan_from(z, 0.3, **changes)
-        stride = simulator.run(node, VLO.state(z), first_step(p, x))
-        return stride.time_of(Event.TOUCHDOWN)
+    def swings(shortest):
+        """From each liftoff to the touchdown in the next step."""
+        p, x = problem_from(z, 0.3, swing=shortest)
+        p.lifted[0] = lifted
+        look_ahead(p, SEARCH, x)
+        before, times = lifted, []
+        for i in range(len(p.ends)):
+            begins = z if i == 0 else x[BLOCK * i - STATES : BLOCK * i]
+            stride = simulator.run(node, VLO.state(begins), step_controls(p, x, i))
+            times.append(before + stride.time_of(Event.TOUCHDOWN))
+            before = stride.duration - stride.time_of(Event.REAR_LIFTOFF)
+        return np.array(times)
 
-    assert lands(earliest=0.0) < 0.1
-    assert lands(earliest=0.12) > 0.11
+    quick, longer = swings(0.0), lifted + 0.2
+    assert quick[0] < lifted + 0.1
+    assert swings(longer)[0] > longer - 0.01
+    assert np.all(swings(0.55)[1:] > 0.54)
+    assert np.all(quick[1:] < 0.54)
+    # A limit that all swings keep changes nothing.
+
+
+def test_a_search_that_is_hopeless_ends():
+    z = row_at(table(), 0.9)[STATE:CONTROL] + [0.0, 0.0, 0.1]
+    ends = [
+        plan_from(z, 0.9, search=search)[0]
+        for search in (SEARCH._replace(rounds=2), SEARCH._replace(hopeless=0.0), SEARCH)
+    ]
+    assert ends[0] == ends[1] > ends[2]
+    assert plan_from(z, 0.9, search=SEARCH._replace(hopeless=1.01 * ends[0]))[0] == ends[2]
 
 
 def test_the_first_angle_is_one_that_the_foot_can_reach(planner):
@@ -286,7 +310,7 @@ def test_any_speed_is_reached_in_a_few_steps(planner, speed, wanted):
 def test_a_robot_s_limits_count():
     """Of its knees, and of its range: the nearest speed in it is aimed at."""
     z = row_at(table(), 0.8)[STATE:CONTROL]
-    held = AheadPlanner(P, limits=WalkLimits(KNEES, (0.6, 0.9)))
+    held = AheadPlanner(P, limits=WalkLimits(KNEES, (0.6, 0.9), 0.155))
     for wanted, aim in [(0.3, 0.6), (1.2, 0.9), (0.7, 0.7)]:
         held.decide(Context(z, np.array([wanted, 0.0, 0.0])))
         assert held.gait.vlo[0] == pytest.approx(aim)

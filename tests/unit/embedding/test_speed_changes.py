@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from importlib.resources import files
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -23,10 +24,11 @@ from template_control.embedding.planners.look_ahead import DEFECT
 from template_control.embedding.planners.lqr import KNEE_STRAIGHT
 from template_control.embedding.planners.speed_changes import speed_changes
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
-from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
+from template_control.slip.maps.return_map import LANDING_TIME, LIFTED_TIME, REAR_BOTTOM, ReturnMap
 
 P = tc.SlipParameters()
 KNEES = 320.0  # [N m]
+SWING = 0.16  # [s]
 
 
 def whole(changes):
@@ -69,12 +71,21 @@ def test_knees_bear_all_steps():
     for change in whole(speed_changes(P)):
         for i in range(len(change.controls)):
             result, (first, second, push) = stride(change, i)
-            rear, front, touchdown = result[REAR_BOTTOM:]
+            rear, front, touchdown = result[REAR_BOTTOM:LANDING_TIME]
             assert moment(push, rear) < 1.02 * KNEES
             assert moment(max(first, second), front) < 1.02 * KNEES
             assert moment(max(first, push), touchdown) < 1.02 * KNEES
             assert moment(first, change.states[i, 1]) < 1.02 * KNEES
             assert moment(second, result[1]) < 1.02 * KNEES
+
+
+def test_all_swings_have_their_time():
+    for change in whole(speed_changes(P)):
+        times = [
+            stride(change, i)[0][[LANDING_TIME, LIFTED_TIME]] for i in range(len(change.controls))
+        ]
+        for (_, lifted), (landing, _) in pairwise(times):
+            assert lifted + landing > 0.99 * SWING
 
 
 def test_the_nearest_and_shortest_come_first():

@@ -9,7 +9,7 @@ from scipy.integrate import quad
 from template_control.errors import ParameterError
 from template_control.paper.map_errors import Grid, study
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
-from template_control.slip.automaton.vocabulary import MapKind, Outcome
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome
 from template_control.slip.dynamics.closed_form import (
     axial_torsional,
     harmonic,
@@ -17,7 +17,7 @@ from template_control.slip.dynamics.closed_form import (
 )
 from template_control.slip.dynamics.guards import COEFFICIENTS, STANCE, Path, sample
 from template_control.slip.dynamics.stride import controls, simulate_stride
-from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.return_map import LANDING_TIME, LIFTED_TIME, ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
@@ -63,6 +63,30 @@ def extrapolated(at, x, h):
     wide, middle, narrow = ((at(x + w) - at(x - w)) / (2.0 * w) for w in (h, h / 2.0, h / 4.0))
     first, second = (4.0 * middle - wide) / 3.0, (4.0 * narrow - middle) / 3.0
     return (16.0 * second - first) / 15.0
+
+
+@pytest.mark.parametrize("stride", ["w", "wp", "rw"])
+def test_times_of_touchdown_and_liftoff_and_their_derivatives(stride):
+    z, u = (np.array(v) for v in STRIDES[stride])
+    step, columns = ReturnMap(P, stride), np.array([0, 1, 2, *range(3, 3 + NUM_SLOTS)])
+    columns = columns[np.r_[: len(z), 3 : len(columns)]]
+
+    def times(z, u):
+        whole = simulate_stride(P, STRIDE_START[stride], step.sections[0].state(z), u)
+        lifted = whole.time_of(Event.REAR_LIFTOFF)
+        return np.array([whole.time_of(Event.TOUCHDOWN), whole.duration - lifted])
+
+    result, slopes, _ = step.derivatives(z, u, columns)
+    found = [LANDING_TIME, LIFTED_TIME]
+    np.testing.assert_allclose(result[found], times(z, u), atol=1e-12)
+    np.testing.assert_array_equal(step.evaluate(z, u)[0][found], result[found])
+    for c, column in enumerate(columns):
+        h = 1e-6 if column < 4 else 1e-6 * K0
+        change = h * np.eye(3 + NUM_SLOTS)[column]
+        there, back = (
+            times(z + sign * change[: len(z)], u + sign * change[3:]) for sign in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(slopes[found, c] * h, (there - back) / 2.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("stride", STRIDES)

@@ -5,12 +5,14 @@ from functools import partial
 from importlib.resources import files
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Context
+from template_control.embedding.robot_template import walk_limits
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
 from template_control.slip.automaton.vocabulary import Outcome
@@ -188,6 +190,17 @@ def test_light_legs_walk_at_all_speeds_and_weak_hips_at_fewer():
     assert fastest < whole[1]
     with pytest.raises(GaitError, match="five-link walks at no speed"):
         tc.walking_speeds(robot, 0.001)
+
+
+def test_a_swing_takes_as_long_as_hips_and_legs_need():
+    """A straight leg goes through a radian along a quintic, with 10 / sqrt(3) rad/T^2 at most."""
+    names = ("bolt", "runner", "five-link", "human", "rabbit")
+    swings = [walk_limits(tc.load_robot(name)).swing for name in names]
+    assert swings == sorted(swings)
+    robot = tc.load_robot("human")
+    pin.crba(robot.model, data := robot.model.createData(), robot.neutral())
+    inertia, torque = data.M[3, 3], robot.torque_limit[0]
+    assert swings[3] == pytest.approx(np.sqrt(10.0 / np.sqrt(3.0) * inertia / torque))
 
 
 ENDS = [("bolt", 0), ("rabbit", 0), ("rabbit", 1), ("human", 1)]
