@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled, inner, inner_by_type
+from template_control.compiled import compiled, inner_by_type
 from template_control.embedding.planners.gait_table import CONTROLS, SLOTS, STATE_TOLERANCE
 from template_control.embedding.planners.lqr import ANGLE_RANGE
 from template_control.embedding.planners.step_search import steepest
@@ -106,7 +106,7 @@ class PlanProblem(NamedTuple):
     ends: Array  # (N, 3) of the steps, overwritten
     lengths: Array  # (N, 5) of legs, where knees count [m], overwritten
     lifted: Array  # (N + 1,) time from a liftoff to the VLO before each step and after the last [s]
-    landing: Array  # (N,) time from there to the touchdown [s], overwritten
+    short: Array  # (N,) time by which each swing is too short [s], overwritten
     change: Array
     lower: Array
     upper: Array
@@ -130,7 +130,7 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         ends=np.empty((steps, STATES)),
         lengths=np.empty((steps, _KNEES)),
         lifted=np.full(steps + 1, np.inf),
-        landing=np.empty(steps),
+        short=np.empty(steps),
         change=change,
         lower=np.full(size, -np.inf),
         upper=np.full(size, np.inf),
@@ -170,12 +170,6 @@ def knee_moment(p: PlanProblem, x: Array, i: int, leg: int) -> tuple[float, floa
     return force * arm, -kappa * arm - 0.25 * force * length / arm, stiff
 
 
-@inner
-def too_short(p: PlanProblem, i: int) -> float:
-    """Time by which the swing that ends in step ``i``, or its part after VLO, is too short [s]."""
-    return max(p.costs.swing - p.lifted[i], p.costs.earliest) - p.landing[i]
-
-
 @inner_by_type(evaluate)
 def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
     """:func:`~.least_squares.evaluate` of a :class:`PlanProblem`."""
@@ -212,8 +206,9 @@ def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
             for leg in range(_KNEES):
                 beyond = knee_moment(p, x, i, leg)[0] / c.knee_moment - 1.0
                 residual[row + _KNEE + leg] = max(beyond, 0.0) / _KNEE_TOLERANCE
-            p.landing[i], p.lifted[i + 1] = p.result[LANDING_TIME], p.result[LIFTED_TIME]
-            residual[row + _SHORT] = max(too_short(p, i), 0.0) / c.short
+            least = max(c.swing - p.lifted[i], c.earliest)
+            p.short[i], p.lifted[i + 1] = least - p.result[LANDING_TIME], p.result[LIFTED_TIME]
+            residual[row + _SHORT] = max(p.short[i], 0.0) / c.short
         for r in range(PER_STEP * steps):
             total += residual[r] * residual[r]
         return total
@@ -262,11 +257,11 @@ def _plan_slopes(problem: Any, x: Any, rows: Any) -> Any:
                     if column == STATES + stiff:
                         slope += moment / x[first + stiff]
                     rows[row + _KNEE + leg, place] = slope / (_KNEE_TOLERANCE * c.knee_moment)
-                if too_short(p, i) > 0.0:
+                if p.short[i] > 0.0:
                     rows[row + _SHORT, place] = -p.jacobian[LANDING_TIME, column] * unit / c.short
                 # Where the whole swing is too short, it may also begin sooner.
-                later = not last and c.swing - p.lifted[i + 1] > c.earliest
-                if later and too_short(p, i + 1) > 0.0:
+                whole = c.swing - p.lifted[i + 1] > c.earliest
+                if not last and whole and p.short[i + 1] > 0.0:
                     slope = -p.jacobian[LIFTED_TIME, column] * unit / c.short
                     rows[row + PER_STEP + _SHORT, place] = slope
             for j in range(CONTROLS):
