@@ -96,7 +96,7 @@ class TemplateState:
     state: Array = field(default_factory=lambda: np.zeros(4))
     toes: Array = field(default_factory=lambda: np.zeros(2))  # (2,) x of rear and front foot [m]
     feet: tuple[int, int] = (0, 1)  # the foot that is the rear leg's, and the front leg's
-    # (2,) time since each foot has lifted off [s], inf of one that stands
+    # (2,) time since each foot has lifted off [s], of one in the air
     swung: Array = field(default_factory=lambda: np.full(2, np.inf))
     # (2,) wanted of the CoM at the last tick [m/s^2]: what is planned anew goes on with it
     acceleration: Array = field(default_factory=lambda: np.zeros(2))
