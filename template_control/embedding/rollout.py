@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Set
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, isnan
 from typing import Annotated, Any
 
 import numpy as np
@@ -367,8 +367,8 @@ class TemplateRollout:
 
 def _lifted(stride: Stride) -> float:
     """Time from the rear leg's liftoff to the end of a stride [s]; inf where there is none."""
-    times = [time for time, event, *_ in stride.events if event is Event.REAR_LIFTOFF]
-    return stride.duration - times[-1] if times else inf
+    since = stride.duration - stride.time_of(Event.REAR_LIFTOFF)
+    return inf if isnan(since) else since
 
 
 def _toes(sensed: TemplateState) -> tuple[float, float]:

@@ -66,6 +66,8 @@ MOST_STEPS = 6
 RISE = (0.13, 0.01)
 """|dy/dt| at VLO that costs nothing, and what is beyond it and costs 1 [m/s], for the reference
 template: from there on the template soon leaves the ground, or the leg sinks."""
+SWING = 0.155
+"""Time of five-link's swing at the least [s]."""
 SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
@@ -78,7 +80,6 @@ _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2,
 # of rabbit ended in a fall, with changes of the table 5.
 _HEAVY_PACE = 0.15
 _EARLIEST = 0.09  # time from VLO to a touchdown at the least [s], for the reference template
-_SWING = 0.155  # time of five-link's swing at the least [s]
 _HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
 _BEHIND = 0.08  # of the wanted speed, that is none [m/s], for the reference
 _MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
@@ -194,7 +195,7 @@ class AheadPlanner(Planner):
         self._spacing = SPACING * scale.speed
         self.parameters = parameters
         self.table: GaitTable = gait_table(parameters)
-        usual = usual_knee_moment(parameters), self.speeds, _SWING * scale.time
+        usual = usual_knee_moment(parameters), self.speeds, SWING * scale.time
         self.limits = limits or WalkLimits(*usual)
         if not self.limits.light:
             pace = min(o.pace, _HEAVY_PACE * scale.speed)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array
+from template_control.embedding.planners.ahead import SWING
 from template_control.embedding.planners.gait_table import (
     COLUMNS,
     CONTROL,
@@ -58,7 +59,6 @@ MOST = 7
 _KNEE = 320.0  # moment that a knee bears [N m]
 _RISE = (0.15, 0.01)  # |dy/dt| that costs nothing, and what is beyond it and costs 1 [m/s]
 _EARLIEST = 0.1  # touchdown after VLO [s]: the swing leg passes the other one about then
-_SWING = 0.155  # time from a foot's liftoff to its touchdown [s]
 _DEFECT = 0.3  # differences between the steps, over those of a plan
 # Differences from the aimed speed, the gaits' height and level that cost 1.
 _TOLERANCE = np.array([32.0, 1.0, 6.0])
@@ -89,7 +89,7 @@ def costs() -> PlanCosts:
         knee_reach=KNEE_STRAIGHT,
         knee_moment=_KNEE,
         earliest=_EARLIEST,
-        swing=_SWING,
+        swing=SWING,
         short=TOO_SHORT,
         unit=np.ones(STATES),
         columns=COLUMNS,
