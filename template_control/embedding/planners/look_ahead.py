@@ -19,25 +19,24 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled, inner_by_type
+from template_control.compiled import compiled, inner, inner_by_type
 from template_control.embedding.planners.gait_table import CONTROLS, SLOTS, STATE_TOLERANCE
 from template_control.embedding.planners.lqr import ANGLE_RANGE
 from template_control.embedding.planners.step_search import steepest
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
 from template_control.slip.control.stride_solver import of_type
+from template_control.slip.dynamics.kernel import kept
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
-    EXACT,
     LANDING_TIME,
     LIFTED_TIME,
     REAR_BOTTOM,
     RESULTS,
-    Derivatives,
     MapWorkspace,
     new_workspace,
-    one_stride,
-    section_jacobian,
+    recorded_jacobian,
+    recorded_stride,
 )
 
 BOUNDS = np.array([[ANGLE_RANGE[0], 0.35, 0.35, 0.35], [ANGLE_RANGE[1], 1.5, 1.5, 1.5]])
@@ -138,7 +137,7 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         u=np.zeros(NUM_SLOTS),
         result=np.empty(RESULTS),
         jacobian=np.empty((RESULTS, BLOCK)),
-        work=new_workspace(),
+        work=new_workspace(steps),
     )
 
 
@@ -150,6 +149,20 @@ def _load(p: PlanProblem, x: Array, i: int) -> None:
         p.z[j] = p.start[j] if i == 0 else x[first - STATES + j]
     for j in range(CONTROLS):
         p.u[SLOTS[j]] = x[first + j] * (1.0 if j == 0 else k)
+
+
+@inner
+def _step(p: PlanProblem, i: int) -> int:
+    """Run step ``i`` from ``p.z`` with ``p.u``; returns the Outcome's value."""
+    scratch = kept(p.work.scratch, i)
+    return recorded_stride(p.costs.kernel, p.z, p.u, scratch, p.result)
+
+
+@inner
+def _linearise(p: PlanProblem, i: int) -> None:
+    """Write the derivatives of step ``i`` as it was run last into ``p.jacobian``."""
+    work = MapWorkspace(kept(p.work.scratch, i), p.work.tangents)
+    recorded_jacobian(p.costs.kernel, p.u, p.costs.columns, work, p.jacobian)
 
 
 @compiled
@@ -180,7 +193,7 @@ def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
         for i in range(steps):
             first, row, last = BLOCK * i, PER_STEP * i, i == steps - 1
             _load(p, x, i)
-            if one_stride(c.kernel, EXACT, p.z, p.u, p.work.scratch, p.result) != 0:
+            if _step(p, i) != 0:
                 return np.inf
             for j in range(STATES):
                 p.ends[i, j] = p.result[j] + p.offset[j]
@@ -222,14 +235,14 @@ def _plan_slopes(problem: Any, x: Any, rows: Any) -> Any:
 
     def at(problem: Any, x: Any, rows: Any) -> Any:
         p, c, reference = problem, problem.costs, problem.reference
-        found, steps = Derivatives(p.result, p.jacobian), p.ends.shape[0]
+        steps = p.ends.shape[0]
         for r in range(rows.shape[0]):
             for j in range(rows.shape[1]):
                 rows[r, j] = 0.0
         for i in range(steps):
             first, row, last = BLOCK * i, PER_STEP * i, i == steps - 1
             _load(p, x, i)
-            section_jacobian(c.kernel, EXACT, p.z, p.u, c.columns, p.work, found)
+            _linearise(p, i)
             rising = 1.0 if p.ends[i, 2] > 0.0 else -1.0
             # The present state is what it is.
             for column in range(STATES if i == 0 else 0, BLOCK):
@@ -311,10 +324,9 @@ def look_ahead(problem: PlanProblem, search: Search, x: Array) -> tuple[float, f
     complete the steps that the search begins with.
     """
     residual, excess = np.empty(PER_STEP * problem.ends.shape[0]), 0.0
-    cost = least_squares(problem, search, residual.shape[0], x)
+    cost = least_squares(problem, search, residual, x)
     if cost == np.inf:
         return np.inf, np.inf
-    evaluate(problem, x, residual)
     for r in range(residual.shape[0]):
         if not _STATE <= r % PER_STEP < _RISE:
             excess += residual[r] * residual[r]
@@ -330,9 +342,8 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
     """
     c, worst, end = p.costs, 0.0, np.empty(STATES)
     _load(p, x, i)
-    section_jacobian(
-        c.kernel, EXACT, p.z, p.u, c.columns, p.work, Derivatives(p.result, p.jacobian)
-    )
+    _step(p, i)
+    _linearise(p, i)
     for j in range(STATES):
         end[j] = p.result[j]
     for k in range(STATES):
@@ -340,7 +351,7 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
         for side in range(2):
             change = (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
             p.z[k] = at + change
-            outcome = one_stride(c.kernel, EXACT, p.z, p.u, p.work.scratch, p.result)
+            outcome = _step(p, i)
             p.z[k] = at
             if outcome != 0:
                 return np.inf

@@ -152,13 +152,13 @@ def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
 
 
 @compiled
-def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
-    """Improve x (f,) in place, for a residual of ``count`` numbers; return the least cost.
+def least_squares(problem: Any, search: Search, residual: Array, x: Array) -> float:
+    """Improve x (f,) in place, and write the residual (r,) there; return the least cost.
 
     Where nothing that was tried can be evaluated it is inf, and x what it was. The problem is
     evaluated last at the x that is returned.
     """
-    size = x.shape[0]
+    size, count = x.shape[0], residual.shape[0]
     here, best, there = _point(count, size), _point(count, size), _point(count, size)
     copy(x, best.x)
     least = evaluate(problem, best.x, best.residual)
@@ -199,6 +199,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
             continue
         if known and last:
             copy(there.x, best.x)
+            copy(there.residual, best.residual)
         if last:
             break
         slopes(problem, there.x, there.rows)
@@ -206,6 +207,7 @@ def least_squares(problem: Any, search: Search, count: int, x: Array) -> float:
         if known:
             _copy(there, best)
     copy(best.x, x)
+    copy(best.residual, residual)
     if not known:
-        evaluate(problem, x, there.residual)
+        evaluate(problem, x, residual)
     return least

@@ -193,7 +193,7 @@ def solve_stride(
         jacobian=np.empty((RESULTS, len(columns))),
     )
     x = base.copy()
-    if least_squares(problem, prior.search, len(stride.ends) + len(x), x) < np.inf:
+    if least_squares(problem, prior.search, np.empty(len(stride.ends) + len(x)), x) < np.inf:
         return u, problem.result[stride.ends]
     u[slots] = base
     return u, None

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from template_control.arrays import Array, BoolArray
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.compiled import inner
 from template_control.slip.automaton.hybrid import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
@@ -40,6 +40,7 @@ class Scratch(NamedTuple):
     cy: Array
     meta: Array
     events: Array
+    recorded: IntArray
     work: Array
     path: Array
     out: Array
@@ -54,13 +55,16 @@ class Scratch(NamedTuple):
     armed: BoolArray
 
 
-def new_scratch() -> Scratch:
-    """Fresh arrays for one thread."""
+def new_scratch(*strides: int) -> Scratch:
+    """Fresh arrays for one thread; with a number, so many strides are kept (:func:`kept`)."""
     return Scratch(
-        cx=np.zeros((MAX_SEGMENTS, ORDER + 1)),  # polynomials of the path's x, a row a segment
-        cy=np.zeros((MAX_SEGMENTS, ORDER + 1)),
-        meta=np.zeros((MAX_SEGMENTS, 7)),  # start time, duration, node, toes, stiffnesses
-        events=np.zeros((MAX_EVENTS, 8)),  # time, event, nodes left and entered, state before reset
+        # Polynomials of the path's x, a row a segment.
+        cx=np.zeros((*strides, MAX_SEGMENTS, ORDER + 1)),
+        cy=np.zeros((*strides, MAX_SEGMENTS, ORDER + 1)),
+        meta=np.zeros((*strides, MAX_SEGMENTS, 7)),  # start time, duration, node, toes, stiffnesses
+        # Time, event, nodes left and entered, state before the reset.
+        events=np.zeros((*strides, MAX_EVENTS, 8)),
+        recorded=np.zeros((*strides, 2), np.int64),  # segments and events
         work=np.zeros((2, 4, ORDER + 1)),  # of the series
         path=np.zeros(COEFFICIENTS),  # of a closed-form phase
         out=np.zeros(6),  # samples of a path
@@ -75,6 +79,18 @@ def new_scratch() -> Scratch:
         bends=np.zeros(NUM_EVENTS),
         armed=np.zeros(MAX_EDGES, dtype=np.bool_),
     )
+
+
+@inner
+def kept(strides: Scratch, i: int) -> Scratch:
+    """Scratch of one of the strides that are kept, for :func:`inner` functions only.
+
+    It owns no reference to its arrays, so a function that counts them would free them.
+    """
+    s = strides
+    own = s.cx[i], s.cy[i], s.meta[i], s.events[i], s.recorded[i]
+    work = s.work, s.path, s.out, s.probe, s.state, s.toes, s.lengths, s.times
+    return Scratch(*own, *work, s.stiffness, s.values, s.bends, s.armed)
 
 
 @inner
@@ -141,8 +157,8 @@ def run_stride(
     """
     tables, node = kernel.tables, kernel.node
     gravity, rest_length, max_time = kernel.gravity, kernel.rest_length, kernel.max_time
-    cx, cy, meta, events, work = scratch[:5]
-    out, stiffness, bends = scratch.out, scratch.stiffness, scratch.bends
+    cx, cy, meta, events = scratch[:4]
+    work, out, stiffness, bends = scratch.work, scratch.out, scratch.stiffness, scratch.bends
     alpha = controls[0]
     touchdown_height = rest_length * np.sin(alpha)
     time, segments, event_count = 0.0, 0, 0

@@ -250,12 +250,7 @@ def _reset(reset: int, alpha: float, rest_length: float, tangents: Tangents) -> 
 
 @inner
 def stride_tangents(
-    kernel: Kernel,
-    controls: Array,
-    segments: int,
-    events: int,
-    scratch: Scratch,
-    tangents: Tangents,
+    kernel: Kernel, controls: Array, scratch: Scratch, tangents: Tangents
 ) -> None:
     """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded in ``scratch``.
 
@@ -271,7 +266,7 @@ def stride_tangents(
     tangents.times[:] = np.nan
     tangents.times[2] = 0.0
     tangents.state[2, 0] = tangents.state[1, 1] = tangents.state[3, 2] = 1.0
-    fired = 0
+    segments, events, fired = scratch.recorded[0], scratch.recorded[1], 0
     for i in range(segments):
         cx, cy, meta = scratch.cx[i], scratch.cy[i], scratch.meta[i]
         step, node = meta[1], int(meta[2])

@@ -46,9 +46,9 @@ class MapWorkspace(NamedTuple):
     tangents: Tangents
 
 
-def new_workspace() -> MapWorkspace:
-    """Fresh arrays for one thread."""
-    return MapWorkspace(new_scratch(), new_tangents())
+def new_workspace(*strides: int) -> MapWorkspace:
+    """Fresh arrays for one thread; with a number, so many strides are kept (:func:`.kept`)."""
+    return MapWorkspace(new_scratch(*strides), new_tangents())
 
 
 class Derivatives(NamedTuple):
@@ -104,6 +104,35 @@ def one_stride(
         outcome = closed_form_stride(kernel, kind, scratch.state, scratch.toes, controls, scratch)
     _conclude(scratch, duration, result)
     return outcome
+
+
+@inner
+def recorded_stride(
+    kernel: Kernel, z: Array, controls: Array, scratch: Scratch, result: Array
+) -> int:
+    """:func:`one_stride` of the exact map, recorded for :func:`recorded_jacobian`."""
+    _begin(z, scratch)
+    ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
+    scratch.recorded[0], scratch.recorded[1] = ended[2], ended[3]
+    _conclude(scratch, ended[4], result)
+    return ended[0]
+
+
+@inner
+def recorded_jacobian(
+    kernel: Kernel, controls: Array, columns: IntArray, work: MapWorkspace, jacobian: Array
+) -> None:
+    """Derivatives (RESULTS, c) of the stride that the scratch has recorded last."""
+    scratch, tangents = work
+    stride_tangents(kernel, controls, scratch, tangents)
+    state, lengths, times = tangents.state, tangents.lengths, tangents.times
+    for c in range(columns.shape[0]):
+        j = columns[c]
+        jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
+        jacobian[3, c] = state[0, j]
+        for leg in range(3):
+            jacobian[4 + leg, c] = lengths[leg, j]
+        jacobian[7, c], jacobian[8, c] = times[0, j], times[2, j] - times[1, j]
 
 
 @compiled
@@ -170,21 +199,9 @@ def section_jacobian(
     """
     if kind != EXACT:
         return _differences(kernel, kind, z, controls, columns, work, found)
-    scratch, tangents = work
-    _begin(z, scratch)
-    ended = run_stride(kernel, scratch.state, scratch.toes, controls, _RECORDED, scratch)
-    _conclude(scratch, ended[4], found.result)
-    stride_tangents(kernel, controls, ended[2], ended[3], scratch, tangents)
-    state, lengths, jacobian = tangents.state, tangents.lengths, found.jacobian
-    times = tangents.times
-    for c in range(columns.shape[0]):
-        j = columns[c]
-        jacobian[0, c], jacobian[1, c], jacobian[2, c] = state[2, j], state[1, j], state[3, j]
-        jacobian[3, c] = state[0, j]
-        for leg in range(3):
-            jacobian[4 + leg, c] = lengths[leg, j]
-        jacobian[7, c], jacobian[8, c] = times[0, j], times[2, j] - times[1, j]
-    return ended[0]
+    outcome = recorded_stride(kernel, z, controls, work.scratch, found.result)
+    recorded_jacobian(kernel, controls, columns, work, found.jacobian)
+    return outcome
 
 
 class Mapped(NamedTuple):
