@@ -63,7 +63,7 @@ def bounded_step(
         there[i] = min(max(x[i], lower[i]), upper[i])
         held[i] = not upper[i] > lower[i]
     normal, right = np.empty((size, size)), np.empty((size, 1))
-    free = np.empty(size, np.int64)
+    free, some = np.empty(size, np.int64), np.empty(size, np.int64)  # some: a row's, not zero
     for _ in range(size):
         count = _NONE
         for i in range(size):
@@ -74,19 +74,24 @@ def bounded_step(
             break
         for a in range(count):
             for b in range(a + 1):
-                total = 0.0
-                for r in range(rows.shape[0]):
-                    total += rows[r, free[a]] * rows[r, free[b]]
-                normal[a, b] = total
-            normal[a, a] *= 1.0 + damping
+                normal[a, b] = 0.0
             right[a, 0] = 0.0
         for r in range(rows.shape[0]):
-            left = residual[r]
+            left, filled = residual[r], _NONE
             for i in range(size):
                 if held[i]:
                     left += rows[r, i] * (there[i] - x[i])
             for a in range(count):
+                if rows[r, free[a]] != 0.0:
+                    some[filled] = a
+                    filled += 1
+            for i in range(filled):
+                a = some[i]
+                for j in range(i + 1):
+                    normal[a, some[j]] += rows[r, free[a]] * rows[r, free[some[j]]]
                 right[a, 0] -= rows[r, free[a]] * left
+        for a in range(count):
+            normal[a, a] *= 1.0 + damping
         if not cholesky(normal, count):
             break
         solve_cholesky(normal, count, right)

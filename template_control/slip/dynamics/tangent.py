@@ -81,7 +81,7 @@ def _leg_series(
     leg: int,
     toe: float,
     stiffness: float,
-    body: tuple[float, float],
+    body: tuple[float, float, int],
     cx: Array,
     cy: Array,
     tangents: Tangents,
@@ -89,10 +89,10 @@ def _leg_series(
     """Write a leg's G and F / m as series along a path ``cx``, ``cy``."""
     squared, cube, inverse, tilt, xx, xy = tangents.leg
     force, pull = tangents.force[leg], tangents.pull[leg]
-    (mass, rest_length), share = body, stiffness / body[0]
+    (mass, rest_length, degree), share = body, stiffness / body[0]
     start = cx[0]
     cx[0] = start - toe  # the series of d_x, until the end of this function
-    for n in range(ORDER - 1):
+    for n in range(degree - 1):
         squared[n] = _product(cx, cx, n) + _product(cy, cy, n)
         if n == 0:
             cube[0] = squared[0] ** -1.5
@@ -109,7 +109,7 @@ def _leg_series(
         force[0, n] = share * (stretch - rest_length * xx[n])
         force[1, n] = -share * rest_length * xy[n]
         force[2, n] = share * (stretch - rest_length * (inverse[n] - xx[n]))
-    for n in range(ORDER - 1):
+    for n in range(degree - 1):
         pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / mass
         pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / mass
     cx[0] = start
@@ -125,7 +125,7 @@ def _flight(step: float, flow: Array) -> None:
 
 
 @inner
-def _stance(rear: bool, front: bool, step: float, tangents: Tangents) -> None:
+def _stance(rear: bool, front: bool, step: float, degree: int, tangents: Tangents) -> None:
     """Write the derivatives of a phase's end, after ``step`` [s], by its beginning.
 
     ``rear`` and ``front`` say which legs are on the ground; :func:`_leg_series` comes before.
@@ -135,7 +135,7 @@ def _stance(rear: bool, front: bool, step: float, tangents: Tangents) -> None:
     dx[:] = 0.0
     dy[:] = 0.0
     dx[0, 0] = dy[0, 1] = dx[1, 2] = dy[1, 3] = 1.0
-    for n in range(ORDER - 1):
+    for n in range(degree - 1):
         scale = 1.0 / ((n + 1) * (n + 2))
         for j in range(n + 1):
             xx = xy = yy = 0.0
@@ -156,7 +156,7 @@ def _stance(rear: bool, front: bool, step: float, tangents: Tangents) -> None:
             dx[n + 2, _KAPPA + 1] += scale * pull[1, 0, n]
             dy[n + 2, _KAPPA + 1] += scale * pull[1, 1, n]
     flow[:] = 0.0
-    for n in range(ORDER, -1, -1):
+    for n in range(degree, -1, -1):
         for c in range(_INPUTS):
             flow[2, c] = flow[2, c] * step + flow[0, c]
             flow[3, c] = flow[3, c] * step + flow[1, c]
@@ -250,16 +250,16 @@ def _reset(reset: int, alpha: float, rest_length: float, tangents: Tangents) -> 
 
 @inner
 def stride_tangents(
-    kernel: Kernel, controls: Array, scratch: Scratch, tangents: Tangents
+    kernel: Kernel, controls: Array, degree: int, scratch: Scratch, tangents: Tangents
 ) -> None:
     """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded in ``scratch``.
 
     ``state``, ``toes``, ``lengths`` and ``times`` of ``tangents`` are overwritten with the
     derivatives at the stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the
-    controls.
+    controls. ``degree`` is that of the tangents' series, :data:`.ORDER` for exact ones.
     """
     tables, alpha, rest_length = kernel.tables, controls[0], kernel.rest_length
-    body = kernel.mass, rest_length
+    body = kernel.mass, rest_length, degree
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
     tangents.lengths[:] = np.nan
@@ -276,7 +276,7 @@ def stride_tangents(
         if front >= 0:
             _leg_series(1, meta[4], meta[6], body, cx, cy, tangents)
         if rear >= 0 or front >= 0:
-            _stance(rear >= 0, front >= 0, step, tangents)
+            _stance(rear >= 0, front >= 0, step, degree, tangents)
         else:
             _flight(step, tangents.flow)
         _carry(rear, front, tangents)
