@@ -18,7 +18,6 @@ from template_control.embedding.planners.gait_table import (
     CONTROLS,
     COST,
     SETTLING,
-    SLOTS,
     STATE,
     STATE_TOLERANCE,
     STEP_DURATION,
@@ -40,6 +39,7 @@ from template_control.embedding.planners.look_ahead import (
     look_ahead,
     new_problem,
     roughness,
+    step_controls,
 )
 from template_control.embedding.planners.lqr import (
     KNEE_STRAIGHT,
@@ -51,7 +51,6 @@ from template_control.embedding.planners.planner import ANY_ANGLE, Context, Deci
 from template_control.embedding.planners.speed_changes import SpeedChange, speed_changes
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import WalkingGait
@@ -61,8 +60,6 @@ from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 from template_control.warm_up import Part, ready
 
-MOST_STEPS = 6
-"""That a plan may look ahead."""
 RISE = (0.13, 0.01)
 """|dy/dt| at VLO that costs nothing, and what is beyond it and costs 1 [m/s], for the reference
 template: from there on the template soon leaves the ground, or the leg sinks."""
@@ -72,6 +69,8 @@ SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
 _SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change of speed, tried in turn
+_HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
+_EFFORT = 16  # linearisations of plans, after which no other change of the table is tried
 _OFF = 2.0  # tolerances off a gait, up to which the plan is one near it
 _BEARABLE = 3.0  # excess of a plan near a change of speed at most
 _DEAREST = 60.0  # and its cost
@@ -80,7 +79,6 @@ _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2,
 # of rabbit ended in a fall, with changes of the table 5.
 _HEAVY_PACE = 0.15
 _EARLIEST = 0.09  # time from VLO to a touchdown at the least [s], for the reference template
-_HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
 _BEHIND = 0.08  # of the wanted speed, that is none [m/s], for the reference
 _MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
 
@@ -96,7 +94,7 @@ class AheadOptions(Checked):
             plan led on; with four it gets faster no sooner.
         pace: largest difference between the aimed speed and the present one. A few steps do not
             lead to a gait that is further away.
-        changes: so many changes of speed of the library's table are tried, where the present state
+        changes: so many changes of speed of the library's table are tried at most, where the state
             is off the gait that is wanted; with none the way there leads over gaits.
         cheap: cost of defects, limits and the last state up to which a plan is taken.
         ease: tolerances of the controls, over the usual ones.
@@ -105,7 +103,7 @@ class AheadOptions(Checked):
 
     kind: ClassVar[str] = "ahead"
 
-    steps: Annotated[int, Range(1, MOST_STEPS)] = tuned(3)
+    steps: Annotated[int, Range(1, 6)] = tuned(3)
     pace: Positive = tuned(0.3, SPEED)
     changes: Annotated[int, Range(0, 10)] = tuned(4)
     cheap: Positive = tuned(20.0)
@@ -114,17 +112,12 @@ class AheadOptions(Checked):
 
 
 FREE_AHEAD = AheadOptions(pace=0.15, changes=0, ease=0.5, dearest=20.0)
-"""Of a quadruped: the sideways motion is that of steps near a gait. Its VLO comes out a little off
-its plan's, most where its speed changes most: at 0.3 m/s a step dy/dt there was 0.07 m/s off, the
-next plan jumped to make up for it, and Go2 fell as it slowed down to its slowest walk. It comes to
-a stand no later.
-"""
+"""Of a quadruped: the sideways motion is that of steps near a gait. At a pace of 0.3 m/s dy/dt at
+VLO was 0.07 m/s off, the next plan jumped to make up for it, and Go2 fell in its slowest walk."""
 
 BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09)
-"""Of a biped with a floating base: of a gait that is further away no plan was cheap in the second
-step, and the search led G1 to a slow one and to a fall, or the foot, on its way down already, was
-wanted further ahead than Bolt's hips could take it.
-"""
+"""Of a biped with a floating base: from further away no plan was cheap in the second step. The
+search led G1 to a slow gait and a fall, or a foot of Bolt too far ahead for its hips."""
 
 
 class WalkLimits(NamedTuple):
@@ -245,14 +238,16 @@ class AheadPlanner(Planner):
         """
         z, target, angles, _, begun, _ = context
         wanted = self._speed if target is None else float(target[0])
-        (low, high), pace = self.speeds, self.options.pace
+        (low, high), o = self.speeds, self.options
         present = min(max(float(z[0]), low), high)
-        slowest, fastest = self.limits.speeds
-        aim = min(max(wanted, slowest), fastest)
-        change = min(max(aim - present, -pace), pace)
-        rough, price = None, np.inf
+        aim = float(np.clip(wanted, *self.limits.speeds))
+        change = min(max(aim - present, -o.pace), o.pace)
+        rough, price, effort = None, np.inf, 0
         for goal, way in self._towards(z, aim):
-            plan = self._look(context, goal, change=way)
+            if effort >= _EFFORT:
+                break
+            plan = self._look(context, goal, way, np.inf)
+            effort += plan.problem.linearised[0]
             if plan.excess > _BEARABLE or plan.cost > _DEAREST:
                 continue
             error = roughness(plan.problem, plan.x, 0)
@@ -270,9 +265,8 @@ class AheadPlanner(Planner):
         cheapest: _Plan | None = None
         for speed in aims:
             hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
-            plan = self._look(context, speed, hopeless=hopeless)
-            cheap = plan.excess <= self.options.cheap
-            if cheap and plan.cost <= (self.options.dearest or np.inf):
+            plan = self._look(context, speed, None, hopeless)
+            if plan.excess <= o.cheap and plan.cost <= (o.dearest or np.inf):
                 error = 0.0 if rough is None else roughness(plan.problem, plan.x, 0)
                 if plan.cost + error**2 < price:
                     return self._begin(plan, wanted)
@@ -302,12 +296,7 @@ class AheadPlanner(Planner):
                 yield goal, way
 
     def _look(
-        self,
-        context: Context,
-        speed: float,
-        *,
-        change: SpeedChange | None = None,
-        hopeless: float = np.inf,
+        self, context: Context, speed: float, change: SpeedChange | None, hopeless: float
     ) -> _Plan:
         """A plan to a speed, near a change of speed or near its gait."""
         steps = self.options.steps if change is None else len(change.controls)
@@ -316,6 +305,7 @@ class AheadPlanner(Planner):
         p, row = self._problems[steps], row_at(self.table, speed)
         target = row[STATE:COST] + row[SETTLING:STEP_DURATION].reshape(-1, STATES) @ self.offset
         p.start[:], p.offset[:], p.lifted[0] = context.z, self.offset, context.lifted
+        p.linearised[0] = 0
         states, free, stiffness, end, factor = p.reference
         end[:], factor[:] = target[:STATES], np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))
         if change is None:
@@ -325,16 +315,13 @@ class AheadPlanner(Planner):
         x, (least, most) = np.empty(len(p.lower)), context.angles
         begin(p, (float(least), float(most)), x)
         cost, excess = look_ahead(p, SEARCH._replace(hopeless=hopeless), x)
-        u = np.zeros(NUM_SLOTS)
-        u[SLOTS] = x[:CONTROLS]
-        u[SLOTS[1:]] *= stiffness[0]
         return _Plan(
             problem=p,
             x=x,
             cost=float(cost),
             excess=float(excess),
             speed=speed,
-            controls=u,
+            controls=step_controls(x[:CONTROLS], stiffness[0]),
             end=p.ends[0].copy(),
             changes=change is not None and steps > 1,
         )
@@ -374,9 +361,8 @@ def plan_costs(parameters: SlipParameters, options: AheadOptions, limits: WalkLi
 
 def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
-    problem = new_problem(
-        plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0)), 1
-    )
+    costs = plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0))
+    problem = new_problem(costs, 1)
     x = np.ones(CONTROLS)
     begin(problem, ANY_ANGLE, x)
     look_ahead(problem, SEARCH, x)
@@ -397,17 +383,15 @@ def check_feasibility(route: Route, planner: AheadPlanner) -> None:
     Raises:
         ScenarioError: naming the first speed that cannot be had in time.
     """
-    behind = _BEHIND * Scale.of(route.parameters).speed
-    simulator = StrideSimulator(route.parameters, AUTOMATON)
+    simulator, unit = StrideSimulator(route.parameters, AUTOMATON), Scale.of(route.parameters).speed
     route.reset()
     z, now = np.array(route.start), 0.0
     for _ in range(_MOST_STRIDES):
-        goal = route.next(VLO, z, now)
-        if goal is None:
+        if (goal := route.next(VLO, z, now)) is None:
             break
         decision = planner.decide(Context(z, goal.target))
         wanted, had = float(goal.target[0]), float(decision.predicted[0])
-        if not decision.feasible or abs(had - wanted) > behind:
+        if not decision.feasible or abs(had - wanted) > _BEHIND * unit:
             raise ScenarioError(
                 f"segment {goal.segment + 1} wants {wanted:.3g} m/s at VLO {now:.1f} s after the"
                 f" start, and {had:.3g} m/s can be had then: give a smaller acceleration or"

@@ -19,7 +19,6 @@ from template_control.embedding.planners.gait_table import (
     COLUMNS,
     CONTROL,
     CONTROLS,
-    SLOTS,
     STATE,
     STATE_TOLERANCE,
     STIFFNESS,
@@ -38,12 +37,12 @@ from template_control.embedding.planners.look_ahead import (
     look_ahead,
     new_problem,
     roughness,
+    step_controls,
 )
 from template_control.embedding.planners.lqr import KNEE_STRAIGHT
 from template_control.embedding.planners.planner import ANY_ANGLE
 from template_control.embedding.planners.speed_changes import SpeedChange
 from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.least_squares import Search
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import simulate_stride
@@ -96,18 +95,11 @@ def costs() -> PlanCosts:
     )
 
 
-def _controls(free: Array, stiffness: float) -> Array:
-    """(NUM_SLOTS,) controls of a step; ``free`` (4,) holds shares of a stiffness [N/m]."""
-    u = np.zeros(NUM_SLOTS)
-    u[SLOTS] = free * [1.0, *[stiffness] * (CONTROLS - 1)]
-    return u
-
-
 def delay(change: SpeedChange) -> float:
     """Time that a change takes, weighted by the share of it that is left [s]."""
     speed, late = change.states[:, 0], 0.0
     for i, (free, k) in enumerate(zip(change.controls, change.stiffness, strict=True)):
-        state, u = VLO.state(change.states[i]), _controls(free, k)
+        state, u = VLO.state(change.states[i]), step_controls(free, k)
         stride = simulate_stride(REFERENCE, STRIDE_START[STRIDE], state, u)
         left = speed[-1] - 0.5 * (speed[i] + speed[i + 1])
         late += stride.duration * abs(left)
@@ -126,7 +118,7 @@ def find_change(
     r.states[:] = rows[1:, STATE : STATE + STATES]
     r.controls[:] = means[:, CONTROL : CONTROL + CONTROLS]
     r.stiffness[:] = means[:, STIFFNESS]
-    begins = _controls(rows[0, CONTROL : CONTROL + CONTROLS], float(rows[0, STIFFNESS]))
+    begins = step_controls(rows[0, CONTROL : CONTROL + CONTROLS], float(rows[0, STIFFNESS]))
     p.lifted[0] = ReturnMap(REFERENCE, STRIDE).evaluate(p.start, begins)[0][LIFTED_TIME]
     r.end[:], r.factor[:] = rows[-1, STATE : STATE + STATES], np.diag(1.0 / c.defect)
     x = np.empty(len(p.lower))

@@ -51,7 +51,7 @@ BLOCK = CONTROLS + STATES
 """Unknowns of a step: its controls, and the state after it."""
 _KNEES = 5
 # Degree of the tangents' series in a search: 0.2 % of a column's largest derivative at most, and
-# 0.001 % from 0.75 m/s on, for half the time of the path's degree.
+# 0.01 % from 0.75 m/s on, for half the time of the path's degree.
 _DEGREE = np.int64(10)
 _STATE, _CONTROL = STATES, 2 * STATES
 _RISE = _CONTROL + CONTROLS
@@ -110,6 +110,7 @@ class PlanProblem(NamedTuple):
     lengths: Array  # (N, 5) of legs, where knees count [m], overwritten
     lifted: Array  # (N + 1,) time from a liftoff to the VLO before each step and after the last [s]
     short: Array  # (N,) time by which each swing is too short [s], overwritten
+    linearised: IntArray  # (1,) how often, counted up
     change: Array
     lower: Array
     upper: Array
@@ -134,6 +135,7 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         lengths=np.empty((steps, _KNEES)),
         lifted=np.full(steps + 1, np.inf),
         short=np.empty(steps),
+        linearised=np.zeros(1, np.int64),
         change=change,
         lower=np.full(size, -np.inf),
         upper=np.full(size, np.inf),
@@ -143,6 +145,13 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         jacobian=np.empty((RESULTS, BLOCK)),
         work=new_workspace(steps),
     )
+
+
+def step_controls(free: Array, stiffness: float) -> Array:
+    """(NUM_SLOTS,) controls of a step; ``free`` (4,) holds shares of a stiffness [N/m]."""
+    u = np.zeros(NUM_SLOTS)
+    u[SLOTS] = free * [1.0, *[stiffness] * (CONTROLS - 1)]
+    return u
 
 
 @compiled
@@ -238,8 +247,8 @@ def _plan_slopes(problem: Any, x: Any, rows: Any) -> Any:
     """:func:`~.least_squares.slopes` of a :class:`PlanProblem`."""
 
     def at(problem: Any, x: Any, rows: Any) -> Any:
-        p, c, reference = problem, problem.costs, problem.reference
-        steps = p.ends.shape[0]
+        p, c, reference, steps = problem, problem.costs, problem.reference, problem.ends.shape[0]
+        p.linearised[0] += 1
         for r in range(rows.shape[0]):
             for j in range(rows.shape[1]):
                 rows[r, j] = 0.0

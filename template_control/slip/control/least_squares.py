@@ -193,7 +193,7 @@ def least_squares(problem: Any, search: Search, residual: Array, x: Array) -> fl
             least = cost
             last = last or (least > search.hopeless and search.rounds - left >= _SOME)
             if done > _GOOD:
-                damping = _LESS * damping if damping > _LESS else 0.0
+                damping = _LESS * damping if damping > _LESS * search.damping else 0.0
             elif done < _BAD:
                 damping = max(damping / _LESS, search.damping)
         elif patience > 0 and cost < np.inf:

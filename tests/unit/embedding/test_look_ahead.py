@@ -347,6 +347,29 @@ def test_a_step_goes_on_to_where_it_went(governed, cause):
     assert governed.decide(Context(seems, wanted)).accepted > began.accepted
 
 
+def test_a_decision_has_an_end(monkeypatch):
+    """Few linearisations, also where no change of the table leads on."""
+    planner, counts = AheadPlanner(P, AheadOptions(steps=4)), []
+    look = planner._look
+
+    def counted(*question):
+        plan = look(*question)
+        counts[-1].append((question[2] is not None, int(plan.problem.linearised[0])))
+        return plan
+
+    monkeypatch.setattr(planner, "_look", counted)
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        z = row_at(table(), rng.uniform(0.5, 1.2))[STATE:CONTROL]
+        target = z + [rng.choice([-0.3, 0.3]), 0.0, 0.0]
+        counts.append([])
+        planner.decide(Context(z + rng.uniform(-1, 1, 3) * [0.02, 0.001, 0.02], target))
+    near = [[count for changes, count in tried if changes] for tried in counts]
+    assert max(len(tried) for tried in near) > 1
+    assert max(sum(tried[:-1]) for tried in near) < 16
+    assert max(count for tried in counts for _, count in tried) <= SEARCH.rounds + 1
+
+
 @pytest.mark.parametrize(("wanted", "end"), [(0.02, 0), (3.0, 1)])
 def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
     there = planner.speeds[end]
