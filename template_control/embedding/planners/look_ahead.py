@@ -26,10 +26,10 @@ from template_control.embedding.planners.step_search import steepest
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
 from template_control.slip.control.stride_solver import of_type
-from template_control.slip.dynamics.kernel import kept
+from template_control.slip.dynamics.kernel import scratch_of
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
-    FULL,
+    FULL_DEGREE,
     LANDING_TIME,
     LIFTED_TIME,
     REAR_BOTTOM,
@@ -167,14 +167,14 @@ def _load(p: PlanProblem, x: Array, i: int) -> None:
 @inner
 def _step(p: PlanProblem, i: int) -> int:
     """Run step ``i`` from ``p.z`` with ``p.u``; returns the Outcome's value."""
-    scratch = kept(p.work.scratch, i)
+    scratch = scratch_of(p.work.scratch, i)
     return recorded_stride(p.costs.kernel, p.z, p.u, scratch, p.result)
 
 
 @inner
 def _linearise(p: PlanProblem, i: int, degree: int) -> None:
     """Write the derivatives of step ``i`` as it was run last into ``p.jacobian``."""
-    work = MapWorkspace(kept(p.work.scratch, i), p.work.tangents)
+    work = MapWorkspace(scratch_of(p.work.scratch, i), p.work.tangents)
     recorded_jacobian(p.costs.kernel, p.u, p.costs.columns, degree, work, p.jacobian)
 
 
@@ -356,7 +356,7 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
     c, worst, end = p.costs, 0.0, np.empty(STATES)
     _load(p, x, i)
     _step(p, i)
-    _linearise(p, i, FULL)
+    _linearise(p, i, FULL_DEGREE)
     for j in range(STATES):
         end[j] = p.result[j]
     for k in range(STATES):

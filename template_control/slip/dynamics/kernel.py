@@ -56,7 +56,7 @@ class Scratch(NamedTuple):
 
 
 def new_scratch(*strides: int) -> Scratch:
-    """Fresh arrays for one thread; with a number, so many strides are kept (:func:`kept`)."""
+    """Fresh arrays for one thread; with a number, so many strides are kept (:func:`scratch_of`)."""
     return Scratch(
         # Polynomials of the path's x, a row a segment.
         cx=np.zeros((*strides, MAX_SEGMENTS, ORDER + 1)),
@@ -82,7 +82,7 @@ def new_scratch(*strides: int) -> Scratch:
 
 
 @inner
-def kept(strides: Scratch, i: int) -> Scratch:
+def scratch_of(strides: Scratch, i: int) -> Scratch:
     """Scratch of one of the strides that are kept, for :func:`inner` functions only.
 
     It owns no reference to its arrays, so a function that counts them would free them.

@@ -81,15 +81,15 @@ def _leg_series(
     leg: int,
     toe: float,
     stiffness: float,
-    body: tuple[float, float, int],
-    cx: Array,
-    cy: Array,
+    body: tuple[float, float],
+    degree: int,
+    path: Path,
     tangents: Tangents,
 ) -> None:
-    """Write a leg's G and F / m as series along a path ``cx``, ``cy``."""
+    """Write a leg's G and F / m as series along a path, up to a degree."""
     squared, cube, inverse, tilt, xx, xy = tangents.leg
     force, pull = tangents.force[leg], tangents.pull[leg]
-    (mass, rest_length, degree), share = body, stiffness / body[0]
+    (mass, rest_length), share, (cx, cy) = body, stiffness / body[0], path
     start = cx[0]
     cx[0] = start - toe  # the series of d_x, until the end of this function
     for n in range(degree - 1):
@@ -259,7 +259,7 @@ def stride_tangents(
     controls. ``degree`` is that of the tangents' series, :data:`.ORDER` for exact ones.
     """
     tables, alpha, rest_length = kernel.tables, controls[0], kernel.rest_length
-    body = kernel.mass, rest_length, degree
+    body = kernel.mass, rest_length
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
     tangents.lengths[:] = np.nan
@@ -268,13 +268,13 @@ def stride_tangents(
     tangents.state[2, 0] = tangents.state[1, 1] = tangents.state[3, 2] = 1.0
     segments, events, fired = scratch.recorded[0], scratch.recorded[1], 0
     for i in range(segments):
-        cx, cy, meta = scratch.cx[i], scratch.cy[i], scratch.meta[i]
+        path, meta = Path(scratch.cx[i], scratch.cy[i]), scratch.meta[i]
         step, node = meta[1], int(meta[2])
         rear, front = tables.rear[node], tables.front[node]
         if rear >= 0:
-            _leg_series(0, meta[3], meta[5], body, cx, cy, tangents)
+            _leg_series(0, meta[3], meta[5], body, degree, path, tangents)
         if front >= 0:
-            _leg_series(1, meta[4], meta[6], body, cx, cy, tangents)
+            _leg_series(1, meta[4], meta[6], body, degree, path, tangents)
         if rear >= 0 or front >= 0:
             _stance(rear >= 0, front >= 0, step, degree, tangents)
         else:
@@ -284,7 +284,7 @@ def stride_tangents(
         if fired == events or at[0] != meta[0] + step or at[2] != node:
             continue  # the series ends here, and the phase goes on
         event = int(at[1])
-        sample(SERIES, Path(cx, cy), step, scratch.out)
+        sample(SERIES, path, step, scratch.out)
         _fire(event, scratch.out, alpha, meta[3:5], rest_length, tangents)
         for edge in range(tables.first_edge[node], tables.first_edge[node + 1]):
             if tables.event[edge] == event:

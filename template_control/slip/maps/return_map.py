@@ -26,7 +26,7 @@ from template_control.slip.parameters import SlipParameters
 _LAST_ONLY, _RECORDED = np.bool_(False), np.bool_(True)
 EXACT = np.int64(MapKind.EXACT)
 """The exact map, for compiled code."""
-FULL = np.int64(ORDER)
+FULL_DEGREE = np.int64(ORDER)
 """Degree of the tangents' series that makes derivatives exact to rounding."""
 _DIFFERENCE = 3e-6  # relative; leaves 1e-11 of the third derivative and 1e-9 of rounding
 
@@ -49,7 +49,7 @@ class MapWorkspace(NamedTuple):
 
 
 def new_workspace(*strides: int) -> MapWorkspace:
-    """Fresh arrays for one thread; with a number, so many strides are kept (:func:`.kept`)."""
+    """Fresh arrays for one thread; with a number, so many strides are kept (`scratch_of`)."""
     return MapWorkspace(new_scratch(*strides), new_tangents())
 
 
@@ -210,7 +210,7 @@ def section_jacobian(
     if kind != EXACT:
         return _differences(kernel, kind, z, controls, columns, work, found)
     outcome = recorded_stride(kernel, z, controls, work.scratch, found.result)
-    recorded_jacobian(kernel, controls, columns, FULL, work, found.jacobian)
+    recorded_jacobian(kernel, controls, columns, FULL_DEGREE, work, found.jacobian)
     return outcome
 
 

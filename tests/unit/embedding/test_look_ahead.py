@@ -40,6 +40,7 @@ from template_control.embedding.planners.look_ahead import (
     look_ahead,
     new_problem,
     roughness,
+    step_controls,
 )
 from template_control.embedding.planners.lqr import KNEE_MOMENT
 from template_control.embedding.planners.planner import ANY_ANGLE, Cause, Context
@@ -48,7 +49,7 @@ from template_control.embedding.robot_template import walk_limits
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome
+from template_control.slip.automaton.vocabulary import Event, Outcome
 from template_control.slip.control.least_squares import Search
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
@@ -103,11 +104,9 @@ def plan_from(z, speed, steps=3, search=SEARCH, **changes):
     return cost, excess, p, x
 
 
-def step_controls(p, x, i=0):
+def controls_of(p, x, i=0):
     """(6,) controls of a plan's step."""
-    u = np.zeros(NUM_SLOTS)
-    u[SLOTS] = x[BLOCK * i :][:CONTROLS] * [1.0, *[p.reference.stiffness[i]] * 3]
-    return u
+    return step_controls(x[BLOCK * i :][:CONTROLS], p.reference.stiffness[i])
 
 
 @pytest.mark.parametrize("moment", [np.inf, 250.0])
@@ -135,7 +134,7 @@ def test_a_plan_is_where_its_cost_is_least(moment):
 def test_roughness_is_what_the_linear_map_misses(speed):
     row, step = row_at(table(), speed), ReturnMap(P, "wp")
     p, x = problem_from(row[STATE:CONTROL], speed)
-    z, u = p.start.copy(), step_controls(p, x)
+    z, u = p.start.copy(), controls_of(p, x)
     here = step.linearise(z, u)
     misses = [
         step.evaluate(z + change, u)[0][:3] - here.state - here.state_jacobian @ change
@@ -187,7 +186,7 @@ def test_a_foot_does_not_land_at_once():
 
     def lands(**changes):
         _, _, p, x = plan_from(z, 0.3, **changes)
-        stride = simulator.run(node, VLO.state(z), step_controls(p, x))
+        stride = simulator.run(node, VLO.state(z), controls_of(p, x))
         return stride.time_of(Event.TOUCHDOWN)
 
     assert lands(earliest=0.0) < 0.1
@@ -208,7 +207,7 @@ def test_a_swing_has_its_time(lifted):
         before, times = lifted, []
         for i in range(len(p.ends)):
             begins = z if i == 0 else x[BLOCK * i - STATES : BLOCK * i]
-            stride = simulator.run(node, VLO.state(begins), step_controls(p, x, i))
+            stride = simulator.run(node, VLO.state(begins), controls_of(p, x, i))
             times.append(before + stride.time_of(Event.TOUCHDOWN))
             before = stride.duration - stride.time_of(Event.REAR_LIFTOFF)
         return np.array(times)

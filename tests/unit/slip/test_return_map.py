@@ -19,7 +19,7 @@ from template_control.slip.dynamics.guards import COEFFICIENTS, STANCE, Path, sa
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.return_map import (
-    FULL,
+    FULL_DEGREE,
     LANDING_TIME,
     LIFTED_TIME,
     RESULTS,
@@ -108,7 +108,7 @@ def test_short_tangent_series_give_nearly_the_same_derivatives():
         kernel, result = ReturnMap(P, gait.stride).kernel[0], np.empty(RESULTS)
         recorded_stride(kernel, gait.vlo, gait.controls, work.scratch, result)
         found = []
-        for degree in (FULL, np.int64(10), np.int64(8)):
+        for degree in (FULL_DEGREE, np.int64(10), np.int64(8)):
             found.append(np.empty((RESULTS, len(columns))))
             recorded_jacobian(kernel, gait.controls, columns, degree, work, found[-1])
         exact, *short = (slopes[:3, np.abs(found[0][:3]).max(0) > 0] for slopes in found)
