@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.planners.ahead import SWING
+from template_control.embedding.planners.ahead import SWING, AheadOptions, WalkLimits, plan_costs
 from template_control.embedding.planners.gait_table import (
-    COLUMNS,
     CONTROL,
     CONTROLS,
     STATE,
@@ -28,9 +27,7 @@ from template_control.embedding.planners.gait_table import (
 )
 from template_control.embedding.planners.look_ahead import (
     BLOCK,
-    DEFECT,
     STATES,
-    TOO_SHORT,
     PlanCosts,
     PlanProblem,
     begin,
@@ -39,12 +36,10 @@ from template_control.embedding.planners.look_ahead import (
     roughness,
     step_controls,
 )
-from template_control.embedding.planners.lqr import KNEE_STRAIGHT
 from template_control.embedding.planners.planner import ANY_ANGLE
 from template_control.embedding.planners.speed_changes import SpeedChange
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.control.least_squares import Search
-from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.maps.return_map import LIFTED_TIME, ReturnMap
 from template_control.slip.maps.section import VLO
@@ -78,20 +73,15 @@ Starts = Callable[[PlanProblem, Array], Iterator[Array]]
 
 
 def costs() -> PlanCosts:
-    """Costs of a change."""
-    return PlanCosts(
-        kernel=stride_kernel(REFERENCE, STRIDE),
-        defect=_DEFECT * DEFECT,
+    """Costs of a change: those of a plan, whose steps join better, and come near no other's."""
+    limits = WalkLimits(_KNEE, (SPEEDS[0], SPEEDS[-1]), SWING)
+    plan = plan_costs(REFERENCE, AheadOptions(), limits)
+    return plan._replace(
+        defect=_DEFECT * plan.defect,
         tolerance=_TOLERANCE,
         control_tolerance=_FREE,
         rise=_RISE,
-        knee_reach=KNEE_STRAIGHT,
-        knee_moment=_KNEE,
         earliest=_EARLIEST,
-        swing=SWING,
-        short=TOO_SHORT,
-        unit=np.ones(STATES),
-        columns=COLUMNS,
     )
 
 
