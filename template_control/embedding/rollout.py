@@ -156,22 +156,20 @@ class RoutePlanners:
     def decide(
         self,
         section: Section,
-        z: Array,
+        question: Context,
         now: float,
         estimators: EstimatorState,
         last: SectionReport | None,
         reached: Array | None = None,
-        lifted: float = inf,
     ) -> tuple[SectionReport, Array, bool]:
         """Learn from the stride that ended, ask the route for the next one, and plan it.
 
-        ``z`` (n,) is the state at the section that was reached, at the time ``now`` [s];
+        ``question`` has the state z (n,) at the section that was reached, at the time ``now`` [s];
         ``estimators`` are for the report, ``last`` is that of the stride that ended, None at the
-        start, and ``reached`` (n,) the state in that stride's axes, None: ``z``. ``lifted`` is the
-        time since the swing foot has lifted off [s]. Returns what was decided, the section state
-        from which its path starts, and whether the route goes on.
+        start, and ``reached`` (n,) the state in that stride's axes, None: z. Returns what was
+        decided, the section state from which its path starts, and whether the route goes on.
         """
-        begin = time.perf_counter()
+        begin, z = time.perf_counter(), question.z
         if last is not None:
             asked(self.of(last.goal).observe, last.decision, z if reached is None else reached)
         wanted = self.next(section, z, now)
@@ -180,11 +178,11 @@ class RoutePlanners:
         planner = self.of(goal)
         if last is not None and last.goal.stride != goal.stride:
             asked(planner.forget)
-        decision, start = self.plan(section, z, goal, lifted)
+        decision, start = self.plan(section, question, goal)
         instead = None if decision.feasible else self._instead(goal)
         if instead is not None:
             goal, planner = instead, self.of(instead)
-            decision, start = self.plan(section, z, goal, lifted)
+            decision, start = self.plan(section, question, goal)
         seconds = time.perf_counter() - begin
         report = SectionReport(
             time=now,
@@ -215,17 +213,15 @@ class RoutePlanners:
         """(3,) dx/dt, y, dy/dt where a goal leads to."""
         return self._sections(goal.stride)[1].padded(goal.target)
 
-    def plan(
-        self, section: Section, z: Array, goal: StrideGoal, lifted: float
-    ) -> tuple[Decision, Array]:
-        """A decision at ``z`` (n,), and the section state from which its path starts.
+    def plan(self, section: Section, question: Context, goal: StrideGoal) -> tuple[Decision, Array]:
+        """A decision towards a goal, and the section state from which its path starts.
 
         The template's leg ends at l0, cannot pull, and pushes as its spring does; the robot's need
         not. Where the template would leave the ground or come to no second stride, the path starts
         from a state that does, and the robot is let down or pushed up to it.
         """
-        planner = self.of(goal)
-        question = Context(z, goal.target, lifted=lifted)
+        planner, z = self.of(goal), question.z
+        question = question._replace(target=goal.target)
         decision = decided(planner, question)
         if decision.lasting:
             return decision, z

@@ -25,7 +25,7 @@ from template_control.embedding.com_path import (
     plan_is_due,
 )
 from template_control.embedding.free.catching import CatchingStep
-from template_control.embedding.planners.planner import Cause, Decision, Planner, Planners
+from template_control.embedding.planners.planner import Cause, Context, Decision, Planner, Planners
 from template_control.embedding.recovery import Recovery
 from template_control.embedding.replanning import (
     RULES,
@@ -181,9 +181,11 @@ class StrideSupervisor:
         last = ended[-1] if ended else None
         if last is not None and reached is not None:
             z = self._rollout.at_section(section, sensed, last)
-        swung = float(sensed.swung[sensed.feet[1]])
+        foot, path = sensed.feet[1], self.data[0]
+        due = np.inf if last is None else float(path["landing_time"][foot] - path["time"])
+        question = Context(z, lifted=float(sensed.swung[foot]), due=due)
         report, start, goes_on = self._planners.decide(
-            section, z, now, estimators, last, reached, swung
+            section, question, now, estimators, last, reached
         )
         self.log = ended
         self._begun, self.goal, self.decision = report, report.goal, report.decision

@@ -6,6 +6,7 @@ import pytest
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.planners.planner import Cause
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.terrain import Terrain
@@ -113,6 +114,24 @@ def test_a_disturbed_walk_is_the_same_wherever_its_memory_lies(gait):
         moved.append([np.zeros(3 * n) for _ in range(1000)])
         again = walk(gait, **pushed)
         np.testing.assert_array_equal(again.torque, first.torque)
+
+
+def test_a_planner_knows_the_swing_at_a_section(gait, monkeypatch):
+    asked, decide = [], LqrPlanner.decide
+
+    def spied(self, context):
+        if context.cause is Cause.SECTION:
+            asked.append(context)
+        return decide(self, context)
+
+    monkeypatch.setattr(LqrPlanner, "decide", spied)
+    record = walk(gait, steps=4)
+    changes = record.time[1:][np.diff(record.node) != 0]
+    assert np.isinf(asked[0].due)
+    for context, section in zip(asked[1:4], record.section_time[1:4], strict=True):
+        liftoff, _, touchdown = changes[np.searchsorted(changes, section + 1e-6) - 2 :][:3]
+        assert context.lifted == pytest.approx(section - liftoff, abs=2e-3)
+        assert context.due == pytest.approx(touchdown - section, abs=0.01)
 
 
 def test_summary_has_every_figure(record):

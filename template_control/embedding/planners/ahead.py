@@ -236,7 +236,7 @@ class AheadPlanner(Planner):
 
         The decision is nominal where a plan was cheap, whatever was accepted.
         """
-        z, target, angles, _, begun, _ = context
+        z, target, angles, _, begun, *_ = context
         wanted = self._speed if target is None else float(target[0])
         (low, high), o = self.speeds, self.options
         present = min(max(float(z[0]), low), high)
@@ -304,8 +304,12 @@ class AheadPlanner(Planner):
             self._problems[steps] = new_problem(self._costs, steps)
         p, row = self._problems[steps], row_at(self.table, speed)
         target = row[STATE:COST] + row[SETTLING:STEP_DURATION].reshape(-1, STATES) @ self.offset
-        p.start[:], p.offset[:], p.lifted[0] = context.z, self.offset, context.lifted
-        p.linearised[0] = 0
+        p.start[:], p.offset[:], p.linearised[0] = context.z, self.offset, 0
+        lifted, due = context.lifted, context.due
+        if 0.0 < due < np.inf:
+            # The quickest swing brings the foot as far as it is in as large a share of its time.
+            lifted = min(lifted, self.limits.swing * lifted / (lifted + due))
+        p.lifted[0] = lifted
         states, free, stiffness, end, factor = p.reference
         end[:], factor[:] = target[:STATES], np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))
         if change is None:

@@ -88,6 +88,7 @@ class Context(NamedTuple):
         cause: of the question.
         decision: what holds so far, within a stride.
         lifted: time since the swing foot has lifted off [s]; inf: as long as it takes.
+        due: time in which it was to land so far [s]; inf: not known.
     """
 
     z: Array
@@ -96,6 +97,7 @@ class Context(NamedTuple):
     cause: Cause = Cause.SECTION
     decision: Decision | None = None
     lifted: float = inf
+    due: float = inf
 
 
 class RestContext(NamedTuple):

@@ -159,7 +159,7 @@ class RunningPlanner(Planner):
 
     def decide(self, context: Context) -> Decision:
         """See :meth:`~.planner.Planner.decide`; the stride is a running step from apex to apex."""
-        z, target, angles, cause, begun, _ = context
+        z, target, angles, cause, begun, *_ = context
         if target is not None and target[0] != self.gait.apex[0]:
             self.gait, _ = self._family.towards(self.gait, target)
         wanted = self.gait.apex if target is None else target

@@ -219,6 +219,24 @@ def test_a_swing_has_its_time(lifted):
     assert np.all(quick[1:] < 0.54)
 
 
+@pytest.mark.parametrize("speed", [0.3, 0.32])
+def test_a_foot_that_was_due_later_has_the_time_for_the_rest_of_its_way(speed):
+    """It has lifted off long ago, and swung slowly: it cannot land at once."""
+    z = row_at(table(), speed)[STATE:CONTROL] + [0.02, 0.0, -0.05]
+    simulator, node = StrideSimulator(P, AUTOMATON), AUTOMATON.start("wp").name
+    speeds, swing = (0.25, 1.4), 0.25
+
+    def lands(due):
+        planner = AheadPlanner(P, limits=WalkLimits(KNEES, speeds, swing))
+        context = Context(z, np.array([speed, 0.0, 0.0]), lifted=0.25, due=due)
+        stride = simulator.run(node, VLO.state(z), planner.decide(context).controls)
+        return stride.time_of(Event.TOUCHDOWN)
+
+    assert lands(np.inf) < 0.1
+    assert lands(0.0) == lands(-0.1) == lands(np.inf)
+    assert lands(0.2) > swing * 0.2 / (0.25 + 0.2) - 0.01
+
+
 def test_a_search_that_is_hopeless_ends():
     z = row_at(table(), 0.9)[STATE:CONTROL] + [0.0, 0.0, 0.1]
     ends = [

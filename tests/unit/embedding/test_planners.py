@@ -190,11 +190,11 @@ def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, befo
     planner = LqrPlanner(gait)
     route = SteadyRoute.of(gait)
     planners = RoutePlanners(route, {"w": planner, "rw": planner}, AUTOMATON)
-    report, *_ = planners.decide(VLO, gait.vlo, 0.0, NOTHING, None)
+    report, *_ = planners.decide(VLO, Context(gait.vlo), 0.0, NOTHING, None)
     planner.offset = np.array([0.02, -0.002, -0.05])
     goal = replace(report.goal, stride=before)
     off_law = replace(report, goal=goal, decision=replace(report.decision, nominal=False))
-    there, *_ = planners.decide(VLO, gait.vlo, 0.5, NOTHING, off_law)
+    there, *_ = planners.decide(VLO, Context(gait.vlo), 0.5, NOTHING, off_law)
     kept = [0.02 if speed_kept else 0.0, -0.002, -0.05]
     np.testing.assert_array_equal(there.offset, kept)
     if not speed_kept:
