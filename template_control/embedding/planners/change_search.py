@@ -73,7 +73,7 @@ Starts = Callable[[PlanProblem, Array], Iterator[Array]]
 
 
 def costs() -> PlanCosts:
-    """Costs of a change: those of a plan, whose steps join better, and come near no other's."""
+    """Costs of a change: a plan's, but with steps that join better, and are nearly free."""
     limits = WalkLimits(_KNEE, (SPEEDS[0], SPEEDS[-1]), SWING)
     plan = plan_costs(REFERENCE, AheadOptions(), limits)
     return plan._replace(
