@@ -25,7 +25,7 @@ from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
 from template_control.slip.dynamics.model import ORDER
-from template_control.slip.dynamics.stride import Stride
+from template_control.slip.dynamics.stride import FiredEvent, Stride, chained
 from template_control.slip.maps.section import VLO
 
 _NEWTON = 12
@@ -60,7 +60,7 @@ class TemplatePath:
 
     strides: tuple[Stride, ...]  # of which it is made, from its start on
     curve: Curve  # the segments
-    events: tuple[tuple[float, Event], ...]  # time on the path [s] and guard of each
+    events: tuple[FiredEvent, ...]  # times are on the path
     landings: tuple[Landing, Landing]  # of the legs that are rear and front at the start
     toes: tuple[float, float]  # x of the rear and the front toe at the start [m]
     section_state: Array  # (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex
@@ -69,19 +69,19 @@ class TemplatePath:
 
     def time_of(self, event: Event, passed: int = 0) -> float:
         """Time of the next ``event`` [s], inf if there is none, once ``passed`` events are over."""
-        return next((time for time, found in self.events[passed:] if found is event), np.inf)
+        return next((e.time for e in self.events[passed:] if e.event is event), np.inf)
 
     def event_times(self, passed: int) -> list[float]:
         """As :meth:`time_of`, of every :class:`Event` by its number."""
         found = [np.inf] * NUM_EVENTS
-        for time, event in reversed(self.events[passed:]):
+        for time, event, *_ in reversed(self.events[passed:]):
             found[event] = time
         return found
 
     def after(self, event: Event, passed: int) -> int:
         """Number of the path's events that are over once the next ``event`` is, if there is one."""
         later = range(passed, len(self.events))
-        return next((i + 1 for i in later if self.events[i][1] is event), passed)
+        return next((i + 1 for i in later if self.events[i].event is event), passed)
 
 
 def join(strides: Sequence[Stride], time_unit: float = 1.0) -> TemplatePath:
@@ -89,46 +89,36 @@ def join(strides: Sequence[Stride], time_unit: float = 1.0) -> TemplatePath:
 
     ``time_unit`` is the template's over the reference template's.
     """
-    meta = np.concatenate([stride.meta for stride in strides])
-    coefficients = np.empty((2, len(meta), ORDER + 1))
-    np.concatenate([stride.cx for stride in strides], out=coefficients[0])
-    np.concatenate([stride.cy for stride in strides], out=coefficients[1])
-    events, resets = [], []
-    row, offset = 0, 0.0
-    for stride in strides:
-        meta[row : row + len(stride.meta), 0] += offset
-        for time, event, _, _, _, reset in stride.events:
-            events.append((offset + time, event))
-            resets.append((offset + time, reset))
-        row, offset = row + len(stride.meta), offset + stride.duration
+    whole = chained(*strides)
+    rear, front = whole.meta[0, 3:5].tolist()
     return TemplatePath(
         strides=tuple(strides),
         curve=Curve(
-            coefficients=coefficients,
-            meta=meta,
-            look=np.array([meta[0, 3], _OVERRUN * time_unit, _LEAP * time_unit]),
+            coefficients=np.array([whole.cx, whole.cy]),
+            meta=whole.meta,
+            look=np.array([rear, _OVERRUN * time_unit, _LEAP * time_unit]),
         ),
-        events=tuple(events),
-        landings=_landings(meta, resets),
-        toes=(float(meta[0, 3]), float(meta[0, 4])),
+        events=whole.events,
+        landings=_landings(whole),
+        toes=(rear, front),
         section_state=VLO.of(strides[0].state),
         outcome=strides[0].outcome,
-        duration=offset,
+        duration=whole.duration,
     )
 
 
-def _landings(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[Landing, Landing]:
+def _landings(stride: Stride) -> tuple[Landing, Landing]:
     """Next touchdowns of the legs by the roles they have at the start."""
     found: dict[int, Landing] = {}
     legs = [Leg.REAR, Leg.FRONT]  # by present role, the role at the start
-    begins = meta[:, 0].tolist()
-    for time, reset in resets:
+    begins = stride.meta[:, 0].tolist()
+    for time, *_, reset in stride.events:
         if reset in (Reset.SHIFT, Reset.SWAP):
             legs.reverse()
         elif reset in (Reset.PLACE_REAR, Reset.PLACE_FRONT):
             role = Leg.REAR if reset is Reset.PLACE_REAR else Leg.FRONT
             later = bisect_left(begins, time - 1e-12)
-            x = float(meta[later, 3 + role]) if later < len(begins) else np.nan
+            x = float(stride.meta[later, 3 + role]) if later < len(begins) else np.nan
             found.setdefault(legs[role], Landing(x, time))
     never = Landing(np.nan, np.inf)
     return found.get(Leg.REAR, never), found.get(Leg.FRONT, never)

@@ -31,8 +31,8 @@ from template_control.embedding.standing.curves import (
 from template_control.embedding.standing.passes import PassTable, SingleSupportPass
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
-from template_control.slip.dynamics.stride import Stride, controls
-from template_control.slip.dynamics.timed import Quintic, chained, timed_stride
+from template_control.slip.dynamics.stride import Stride, chained, controls
+from template_control.slip.dynamics.timed import Quintic, timed_stride
 from template_control.slip.gaits.gait import Gait, GaitsBySpeed
 from template_control.slip.gaits.walking_by_speed import paper_walks, walking_by_speed
 from template_control.slip.parameters import SlipParameters

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import accumulate
 from math import isfinite
 from typing import NamedTuple
 
@@ -101,6 +102,25 @@ class Stride:
     def nodes(self, times: ArrayLike) -> list[str]:
         """Name of the automaton's node at each of ``times`` [s]."""
         return [self.node_names[int(i)] for i in self.meta[self.rows(np.atleast_1d(times)), 2]]
+
+
+def chained(*strides: Stride) -> Stride:
+    """Strides, or parts of one, as one that ends as the last; each starts where one has ended."""
+    starts = [0.0, *accumulate(stride.duration for stride in strides)]
+    meta = np.concatenate([stride.meta for stride in strides])
+    meta[:, 0] += np.repeat(starts[:-1], [len(stride.meta) for stride in strides])
+    return replace(
+        strides[-1],
+        duration=starts[-1],
+        events=tuple(
+            event._replace(time=start + event.time)
+            for start, stride in zip(starts, strides, strict=False)
+            for event in stride.events
+        ),
+        cx=np.concatenate([stride.cx for stride in strides]),
+        cy=np.concatenate([stride.cy for stride in strides]),
+        meta=meta,
+    )
 
 
 @checked

@@ -7,7 +7,6 @@ between the feet, and each acts along its leg.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -107,19 +106,4 @@ def timed_stride(
         cy=paths[1],
         meta=meta,
         node_names=tuple(automaton.index),
-    )
-
-
-def chained(first: Stride, second: Stride) -> Stride:
-    """Two parts of one stride; the second starts where the first ended, at an event within it."""
-    meta = second.meta.copy()
-    meta[:, 0] += first.duration
-    events = (event._replace(time=first.duration + event.time) for event in second.events)
-    return replace(
-        second,
-        duration=first.duration + second.duration,
-        events=(*first.events, *events),
-        cx=np.concatenate((first.cx, second.cx)),
-        cy=np.concatenate((first.cy, second.cy)),
-        meta=np.concatenate((first.meta, meta)),
     )

@@ -22,6 +22,7 @@ double stance sum_i c_i x_i = sum_i c_i x - d2x/dt2.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -30,7 +31,7 @@ from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import Leg, Reset
 from template_control.slip.dynamics.guards import SERIES, Path, sample
-from template_control.slip.dynamics.stride import Stride
+from template_control.slip.dynamics.stride import Stride, chained
 
 NEXT = 2
 """Index of the next foothold; 0 and 1 are those of the rear and the front toe at the start."""
@@ -85,22 +86,14 @@ def lateral_path(
         gravity: g [m/s^2].
         ratio, stretch: see :class:`LateralPath`.
     """
-    metas, resets, sections, offset = [], [], [], 0.0
-    for stride in strides:
-        meta = stride.meta.copy()
-        meta[:, 0] += offset
-        metas.append(meta)
-        resets += [(offset + e.time, e.reset) for e in stride.events]
-        offset += stride.duration
-        if stride.completed:
-            sections.append(offset)
-    meta = np.concatenate(metas)
-    footholds, touchdown, stance = _footholds(meta, resets)
-    height = float(strides[0].cy[0, 0])  # of a robot that falls it may be below its foot
+    whole, ends = chained(*strides), accumulate(stride.duration for stride in strides)
+    footholds, touchdown, stance = _footholds(whole)
+    height = float(whole.cy[0, 0])  # of a robot that falls it may be below its foot
+    sections = (end for stride, end in zip(strides, ends, strict=True) if stride.completed)
     section = next((time for time in sections if time > touchdown), np.inf)
     path = LateralPath(
-        coefficients=np.concatenate([(s.cx, s.cy) for s in strides], axis=1),
-        meta=meta,
+        coefficients=np.array([whole.cx, whole.cy]),
+        meta=whole.meta,
         footholds=footholds,
         gravity=float(gravity),
         longest=_SHARE * float(np.sqrt(height / gravity)) if height > 0.0 else np.inf,
@@ -129,12 +122,13 @@ def _nodes(path: LateralPath) -> Array:
     return np.concatenate(nodes)
 
 
-def _footholds(meta: Array, resets: Sequence[tuple[float, Reset]]) -> tuple[IntArray, float, int]:
+def _footholds(stride: Stride) -> tuple[IntArray, float, int]:
     """Foothold of each leg in each segment; time of the first landing, and next to which."""
+    meta = stride.meta
     legs = np.arange(2)  # the foothold of each role
     landings: list[tuple[float, int]] = []
     footholds = np.tile(legs, (len(meta), 1))
-    for time, reset in resets:
+    for time, *_, reset in stride.events:
         if reset in (Reset.SHIFT, Reset.SWAP):
             legs = legs[::-1].copy()
         elif reset in (Reset.PLACE_REAR, Reset.PLACE_FRONT):
