@@ -24,9 +24,7 @@ from template_control.robot.terms import UP
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import Event, Reset
-from template_control.slip.dynamics.stride import StrideSimulator
-from template_control.slip.gaits.gait import Gait
-from template_control.slip.maps.section import APEX
+from template_control.slip.gaits.gait import Gait, gait_stride
 
 _NEAR = 0.9  # of l0: a distance from the CoM that any leg reaches
 _LEVEL = 1.0  # the same of a leg with a level sole: more bent, its ankle comes to its stop
@@ -73,9 +71,7 @@ def apex_pose(
         ParameterError: if the gait's legs do not take turns in the air.
     """
     gait, z = start.gait, start.state
-    simulator = StrideSimulator(gait.parameters, start.automaton)
-    node = start.automaton.start(gait.stride).name
-    stride = simulator.run(node, APEX.state(gait.state), gait.controls)
+    stride = gait_stride(gait, start.automaton)
     if not any(event.reset is Reset.SWAP for event in stride.events):
         raise ParameterError(
             f"the legs of gait {gait.name!r} do not take turns: give the Experiment a pose"

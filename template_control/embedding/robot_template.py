@@ -22,11 +22,15 @@ from template_control.embedding.standing.curves import StandingOptions
 from template_control.errors import GaitError, ScenarioError
 from template_control.robot.biped import Biped
 from template_control.robot.terms import UP
-from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
-from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.gaits.family_search import stance_figures
-from template_control.slip.gaits.gait import WalkingGait, gait_at, gait_from_energy, with_push_off
+from template_control.slip.gaits.gait import (
+    WalkingGait,
+    gait_at,
+    gait_from_energy,
+    gait_stride,
+    with_push_off,
+)
 from template_control.slip.gaits.running_gait import (
     RunningGait,
     running_gait,
@@ -40,7 +44,6 @@ from template_control.slip.gaits.walking_by_speed import (
     walking_by_speed,
 )
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
-from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.scenario import STAND, Scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
@@ -240,7 +243,7 @@ def _swing(robot: Biped, gait: WalkingGait) -> tuple[float, float]:
     quintic. The robot was last updated with straight legs, as :func:`template_for` leaves it.
     """
     p = gait.parameters
-    stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
+    stride = gait_stride(gait)
     double = stride.time_of(Event.REAR_LIFTOFF) - stride.time_of(Event.TOUCHDOWN)
     time = gait.step_duration - double
     # The foot goes two steps while the hips move on.

@@ -20,13 +20,15 @@ from scipy.linalg import LinAlgError
 
 from template_control.arrays import Array
 from template_control.errors import GaitError
-from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.control.lqr import lqr
-from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import WalkingGait, vlo_jacobians, without_push_off
+from template_control.slip.gaits.gait import (
+    WalkingGait,
+    gait_stride,
+    vlo_jacobians,
+    without_push_off,
+)
 from template_control.slip.gaits.walking_by_speed import Chain, coordinates, nearest_gait
-from template_control.slip.maps.section import VLO
 from template_control.slip.similarity import REFERENCE
 
 _SAMPLES = 60
@@ -79,7 +81,7 @@ def stance_figures(gait: WalkingGait) -> tuple[float, float]:
     line of the push.
     """
     p = gait.parameters
-    stride = simulate_stride(p, STRIDE_START[gait.stride], VLO.state(gait.vlo), gait.controls)
+    stride = gait_stride(gait)
     times = np.linspace(0.0, stride.duration, _SAMPLES)
     x, y = stride.sample(times)[:, :2].T
     row = stride.rows(times)

@@ -29,7 +29,7 @@ from template_control.slip.automaton.vocabulary import (
     StrideKind,
     WalkingStride,
 )
-from template_control.slip.dynamics.stride import controls, simulate_stride
+from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, section_of
 from template_control.slip.parameters import SlipParameters, Slope
@@ -360,13 +360,16 @@ def _least_change(weights: Array, wanted: Array, slopes: Array, missing: Array) 
     return np.asarray(solution[:n], dtype=np.float64)
 
 
+def gait_stride(gait: Gait, automaton: Automaton = AUTOMATON) -> Stride:
+    """The stride of a gait, from its section on; ``automaton`` is that of its kind."""
+    start = automaton.start(gait.stride).name
+    state = section_of(automaton.sections(start)[0]).state(gait.state)
+    return simulate_stride(gait.parameters, start, state, gait.controls, automaton=automaton)
+
+
 def flight_share(gait: Gait, automaton: Automaton = AUTOMATON) -> float:
     """Share of a gait's stride in which no foot is on the ground."""
-    start = automaton.start(gait.stride).name
-    section = section_of(automaton.sections(start)[0])
-    stride = simulate_stride(
-        gait.parameters, start, section.state(gait.state), gait.controls, automaton=automaton
-    )
+    stride = gait_stride(gait, automaton)
     flies = [node.phase is Phase.F for node in automaton.nodes]
     return float(sum(row[1] for row in stride.meta if flies[int(row[2])]) / stride.duration)
 

@@ -14,10 +14,8 @@ from template_control.checks.ranges import Interval, NotNegative, Positive, Shar
 from template_control.errors import GaitError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
-from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.gaits.gait import Gait
+from template_control.slip.gaits.gait import Gait, gait_stride
 from template_control.slip.lateral.path import NEXT, lateral_path, transition
-from template_control.slip.maps.section import section_of
 from template_control.slip.similarity import (
     LENGTH,
     PER_LENGTH_SQUARED,
@@ -156,9 +154,7 @@ def lateral_gait(
         GaitError: if the gait's stride is not completed, or no foot lands in it.
     """
     p, start = gait.parameters, automaton.start(gait.stride)
-    node, state = start.name, gait.state
-    section = section_of(automaton.sections(node)[0])
-    stride = simulate_stride(p, node, section.state(state), gait.controls, automaton=automaton)
+    stride = gait_stride(gait, automaton)
     path = lateral_path((stride,), p.gravity, ratio)
     if not np.isfinite(path.section):
         raise GaitError(
@@ -177,7 +173,7 @@ def lateral_gait(
     width = 1.0 if start.stance else o.running_width
     ahead = 0.0 if start.stance else float(stride.state[0] - max(stride.toes))
     return LateralGait(
-        a.copy(), b, cost, gain, float(state[0]), width, length=gait.step_length, ahead=ahead
+        a.copy(), b, cost, gain, float(gait.state[0]), width, length=gait.step_length, ahead=ahead
     )
 
 
