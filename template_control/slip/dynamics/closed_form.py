@@ -23,7 +23,7 @@ from template_control.slip.dynamics.guards import (
     root,
     sample,
 )
-from template_control.slip.dynamics.kernel import Scratch, apply_reset, enter, note_lengths
+from template_control.slip.dynamics.kernel import Scratch, apply_reset, enter, note
 from template_control.slip.dynamics.model import Kernel, backward
 
 _NEWTON = 6
@@ -352,7 +352,7 @@ def closed_form_stride(
             continue
         edge += tables.first_edge[node]
         event = tables.event[edge]
-        note_lengths(event, state, toes, scratch.lengths)
+        note(event, np.nan, state, toes, scratch)
         apply_reset(tables.reset[edge], state, toes, rest_length, alpha)
         if tables.outcome[edge] >= 0:
             return tables.outcome[edge]

@@ -108,19 +108,14 @@ def apply_reset(reset: int, state: Array, toes: Array, rest_length: float, alpha
 
 
 @inner
-def note_lengths(event: int, state: Array, toes: Array, lengths: Array) -> None:
-    """Write legs' lengths [m] into ``lengths`` of :class:`Scratch` at a bottom or a touchdown."""
+def note(event: int, time: float, state: Array, toes: Array, scratch: Scratch) -> None:
+    """Write legs' lengths [m] and the time [s] of an event that ``scratch`` keeps them of."""
+    lengths, times = scratch.lengths, scratch.times
     if event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
         for leg in range(2):
             lengths[leg] = np.sqrt((state[0] - toes[leg]) ** 2 + state[1] ** 2)
     elif event == Event.TOUCHDOWN:
         lengths[2] = np.sqrt((state[0] - toes[0]) ** 2 + state[1] ** 2)
-
-
-@inner
-def note_time(event: int, time: float, times: Array) -> None:
-    """Write the time of a touchdown or a rear leg's liftoff [s] into ``times`` of the scratch."""
-    if event == Event.TOUCHDOWN:
         times[0] = time
     elif event == Event.REAR_LIFTOFF:
         times[1] = time
@@ -196,8 +191,7 @@ def run_stride(
         for i in range(4):
             events[row, 4 + i] = state[i]
         event_count += 1
-        note_lengths(event, state, toes, scratch.lengths)
-        note_time(event, time, scratch.times)
+        note(event, time, state, toes, scratch)
         apply_reset(tables.reset[fired], state, toes, rest_length, alpha)
         if outcome >= 0:
             return outcome, (target if target >= 0 else node), segments, event_count, time
