@@ -23,13 +23,12 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Outcome, Reset
-from template_control.slip.dynamics.model import ORDER
+from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event, Leg, Reset
 from template_control.slip.dynamics.stride import FiredEvent, Stride, chained
+from template_control.slip.dynamics.timed import polynomial
 from template_control.slip.maps.section import VLO
 
 _NEWTON = 12
-_X, _Y = np.int64(0), np.int64(1)  # Numba would compile once for each literal int
 _TOUCHDOWN = int(Event.TOUCHDOWN)
 # Times of the reference template.
 _OVERRUN = 0.02  # [s] that a segment's polynomial is followed past its ends: template and robot do
@@ -64,8 +63,6 @@ class TemplatePath:
     landings: tuple[Landing, Landing]  # of the legs that are rear and front at the start
     toes: tuple[float, float]  # x of the rear and the front toe at the start [m]
     section_state: Array  # (3,) dx/dt, y, dy/dt where the first stride ends, at VLO or apex
-    outcome: Outcome  # how the first stride ends
-    duration: float  # end of the last segment [s]
 
     def time_of(self, event: Event, passed: int = 0) -> float:
         """Time of the next ``event`` [s], inf if there is none, once ``passed`` events are over."""
@@ -102,8 +99,6 @@ def join(strides: Sequence[Stride], time_unit: float = 1.0) -> TemplatePath:
         landings=_landings(whole),
         toes=(rear, front),
         section_state=VLO.of(strides[0].state),
-        outcome=strides[0].outcome,
-        duration=whole.duration,
     )
 
 
@@ -125,17 +120,6 @@ def _landings(stride: Stride) -> tuple[Landing, Landing]:
 
 
 @compiled
-def _polynomial(c: Array, t: float, out: Array, first: int) -> None:
-    """Value, first and second derivative at ``t`` into out[first], out[first+2], ..."""
-    p = d = dd = 0.0
-    for n in range(ORDER, -1, -1):
-        dd = dd * t + d
-        d = d * t + p
-        p = p * t + c[n]
-    out[first], out[first + 2], out[first + 4] = p, d, 2.0 * dd
-
-
-@compiled
 def sample(curve: tuple[Array, Array, Array], time: float, out: Array) -> int:
     """Write the path at ``time`` into out (6,): x from the toe, y, and their two derivatives.
 
@@ -152,8 +136,8 @@ def sample(curve: tuple[Array, Array, Array], time: float, out: Array) -> int:
         row += 1
     # Past either end the path goes on along its last polynomial for a moment, then stops.
     local = min(max(time - meta[row, 0], -look[1]), meta[row, 1] + look[1])
-    _polynomial(coefficients[0, row], local, out, _X)
-    _polynomial(coefficients[1, row], local, out, _Y)
+    out[0], out[2], out[4] = polynomial(coefficients[0, row], local)
+    out[1], out[3], out[5] = polynomial(coefficients[1, row], local)
     out[0] -= look[0]
     return row
 

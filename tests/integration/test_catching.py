@@ -201,7 +201,7 @@ def test_a_push_within_a_step_is_answered_by_a_walk_or_by_a_run():
     assert (len(supervisor.reports), report.goal.stride) == (1, "wr")
     assert report.decision.feasible
     assert report.target[2] == 0.0, "of an apex"
-    assert supervisor.path.outcome is Outcome.SECTION
+    assert supervisor.path.strides[0].outcome is Outcome.SECTION
     supervisor.choose_assist(node, TemplateState(VLO.state(WALK.vlo), np.zeros(2)))
     assert supervisor.ground.assist == 0.0, "a planner that knows no slopes has no assist"
     _, node = pushed(0.9, None)

@@ -119,7 +119,7 @@ def test_a_slow_double_stance_is_carried_to_the_next_vlo(node):
     assert (len(supervisor.reports), report.goal.stride) == (1, "ww")
     assert report.decision.feasible
     np.testing.assert_array_equal(report.target, WALK.vlo)
-    assert supervisor.path.outcome is Outcome.SECTION
+    assert supervisor.path.strides[0].outcome is Outcome.SECTION
     _, after = slow(node, 0.3, (0.0, 0.5), float(WALK.vlo[0]))
     assert after.name == node, "fast enough, it walks"
 

@@ -166,7 +166,7 @@ def test_stiffnesses_follow_from_where_the_foot_has_landed(supervisor, gait, ear
     assert after[Slot.TOUCHDOWN_ANGLE] == pytest.approx(angle, abs=1e-9)
     # From a flatter leg a stiffer one would throw the CoM over its apex.
     assert after[Slot.K_SC] < 0.97 * before[Slot.K_SC]
-    assert supervisor.path.outcome is Outcome.SECTION
+    assert supervisor.path.strides[0].outcome is Outcome.SECTION
     np.testing.assert_allclose(supervisor.path.section_state, [*gait.apex, 0.0], atol=0.03)
 
 

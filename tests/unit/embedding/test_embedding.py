@@ -30,7 +30,7 @@ def test_joined_path_is_continuous_and_knows_its_events(gait):
     )
     second = simulate_stride(P, first.node, first.state, u, tuple(first.toes))
     path = join([first, second])
-    times = np.linspace(0.0, path.duration - 1e-6, 400)
+    times = np.linspace(0.0, first.duration + second.duration - 1e-6, 400)
     states = np.empty((400, 6))
     for t, row in zip(times, states, strict=True):
         sample(path.curve, t, row)

@@ -243,7 +243,7 @@ def test_a_push_within_a_transition_gets_other_stiffnesses():
     )
     kept = [Slot.TOUCHDOWN_ANGLE, Slot.K_SC, Slot.K_SD]
     np.testing.assert_array_equal(after[kept], before[kept])
-    assert supervisor.path.outcome is Outcome.SECTION
+    assert supervisor.path.strides[0].outcome is Outcome.SECTION
 
 
 def test_where_the_rest_cannot_be_done_the_controls_stay():
