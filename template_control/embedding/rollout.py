@@ -272,7 +272,7 @@ class TemplateRollout:
 
         ``sensed`` has the toes; ``state`` (4,) is x, y, dx/dt, dy/dt, ``u`` are controls by Slot.
         """
-        return self._simulator.run(node, state, u, _toes(sensed))
+        return self._simulator.run(node, state, u, sensed.toes)
 
     def curve(
         self, node: str, sensed: TemplateState, state: Array, planner: Planner, decision: Decision
@@ -283,7 +283,8 @@ class TemplateRollout:
         so far; ``state`` (4,) is x, y, dx/dt, dy/dt. A ParameterError if the planner has none.
         """
         start = np.column_stack((state[:2], state[2:4], sensed.acceleration))
-        return curved(planner, node, start, _toes(sensed), decision)
+        rear, front = sensed.toes.tolist()
+        return curved(planner, node, start, (rear, front), decision)
 
     def strides(
         self, node: Node, first: Stride, goal: StrideGoal, now: float
@@ -309,14 +310,13 @@ class TemplateRollout:
             start = self.automaton.start(then.stride).name
             if start in self.curved:
                 break  # both feet stand: there is no foothold to know
-            toes = (float(last.toes[0]), float(last.toes[1]))
-            strides.append(self._simulator.run(start, last.state, ahead.controls, toes))
+            strides.append(self._simulator.run(start, last.state, ahead.controls, last.toes))
             more -= 1
         return strides, whole and all(stride.completed for stride in strides)
 
     def ahead(self, node: Node, sensed: TemplateState) -> StrideEnd:
         """End of the present stride from here, by its controls."""
-        return rest(self._simulator, node.name, sensed.state, _toes(sensed), self._work)
+        return rest(self._simulator, node.name, sensed.state, sensed.toes, self._work)
 
     def at_section(self, section: Section, sensed: TemplateState, last: SectionReport) -> Array:
         """(n,) section state that the template passes through, a little before or after it.
@@ -365,7 +365,3 @@ def _lifted(stride: Stride) -> float:
     """Time from the rear leg's liftoff to the end of a stride [s]; inf where there is none."""
     since = stride.duration - stride.time_of(Event.REAR_LIFTOFF)
     return inf if isnan(since) else since
-
-
-def _toes(sensed: TemplateState) -> tuple[float, float]:
-    return float(sensed.toes[0]), float(sensed.toes[1])

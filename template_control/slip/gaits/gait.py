@@ -335,15 +335,9 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
         x += step
         if np.max(np.abs(step)) < _DONE:
             z, u, own = unpacked(x)
-            end = simulate_stride(own, STRIDE_START[gait.stride], VLO.state(z), u)
-            return replace(
-                gait,
-                parameters=own,
-                state=z,
-                controls=u,
-                step_length=float(end.state[0]),
-                step_duration=end.duration,
-            )
+            found = replace(gait, parameters=own, state=z, controls=u)
+            end = gait_stride(found)
+            return replace(found, step_length=float(end.state[0]), step_duration=end.duration)
     raise GaitError(
         f"no walking gait with {gait.vlo[0]:.3g} m/s at VLO on a slope of"
         f" {np.degrees(slope):.3g} deg: take a gentler slope"
