@@ -101,31 +101,23 @@ def scaled(options: T, scale: Scale) -> T:
     Fields from :func:`tuned` are scaled, also those of dataclasses in fields, tuples or mappings.
     """
     changes = {
-        f.name: _scaled_value(getattr(options, f.name), f.metadata.get(_KEY), scale)
+        f.name: _scaled_value(getattr(options, f.name), f.metadata.get(_KEY, ()), scale)
         for f in fields(options)  # type: ignore[arg-type]
     }
     return replace(options, **changes)  # type: ignore[type-var]
 
 
-def _scaled_value(value: Any, dimensions: tuple[Dimension, ...] | None, scale: Scale) -> Any:
-    if dimensions is None:
-        return _scaled_inside(value, scale)
+def _scaled_value(value: Any, dimensions: tuple[Dimension, ...], scale: Scale) -> Any:
+    """A field's value; the ``dimensions`` are those of :func:`tuned`, none of other fields."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return scaled(value, scale)
+    if isinstance(value, Mapping):
+        return {key: _scaled_value(entry, dimensions, scale) for key, entry in value.items()}
     if isinstance(value, tuple):
-        nested = value and isinstance(value[0], tuple)
-        if nested or len(dimensions) == 1:
+        if len(dimensions) < 2 or (value and isinstance(value[0], tuple)):
             return tuple(_scaled_value(entry, dimensions, scale) for entry in value)
         pairs = zip(value, dimensions, strict=True)
         return tuple(_scaled_value(entry, (dimension,), scale) for entry, dimension in pairs)
-    if value is None or dimensions[0] == NUMBER:
+    if value is None or dimensions in ((), (NUMBER,)):
         return value
     return value * scale.factor(dimensions[0])
-
-
-def _scaled_inside(value: Any, scale: Scale) -> Any:
-    if is_dataclass(value) and not isinstance(value, type):
-        return scaled(value, scale)
-    if isinstance(value, tuple):
-        return tuple(_scaled_inside(entry, scale) for entry in value)
-    if isinstance(value, Mapping):
-        return {key: _scaled_inside(entry, scale) for key, entry in value.items()}
-    return value
