@@ -30,12 +30,6 @@ _NEWTON = 6
 
 
 @inner
-def polar(x: float, y: float) -> tuple[float, float]:
-    """Radius [m] and angle from forward horizontal [rad] of a point above a pivot."""
-    return np.sqrt(x * x + y * y), np.arctan2(y, x)
-
-
-@inner
 def axial_torsional(
     spread: float, stiffness: float, mass: float, gravity: float, rest_length: float
 ) -> tuple[float, float, float]:
@@ -266,8 +260,9 @@ def _stance(
             # The AT-SLIP stands for two equal legs; for others only the correction is right.
             map_kind = MapKind.IMPROVED
         k, length, torsion = axial_torsional(toes[1] - toes[0], mean, mass, gravity, rest_length)
-    r, theta = polar(state[0] - pivot, state[1])
-    c, s = (state[0] - pivot) / r, state[1] / r
+    d, y = state[0] - pivot, state[1]
+    r, theta = np.sqrt(d * d + y * y), np.arctan2(y, d)
+    c, s = d / r, y / r
     radial = state[2] * c + state[3] * s
     momentum = r * (state[3] * c - state[2] * s)
     w2 = k / mass
