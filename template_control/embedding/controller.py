@@ -36,7 +36,7 @@ from template_control.embedding.tick import (
     TICK,
     act,
     advance,
-    feel_in_space,
+    feel_friction,
     look,
     sense,
     solve,
@@ -269,8 +269,8 @@ class EmbeddingController:
         if self.frame.angle != 0.0:
             solution = solution._replace(acceleration=self.frame.leave(solution.acceleration))
         if force is not None and self.lateral is not None:
-            robot = self.lateral.robot
-            feel_in_space(self._tick, robot.data, self.qp.data, force, robot.axes, dt)
+            felt = force @ self.lateral.robot.axes
+            feel_friction(self._tick, self.robot.data, self.qp.data, felt, dt)
         return solution
 
     def lateral_state(self) -> Array:

@@ -201,12 +201,6 @@ def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> Non
 
 
 @compiled
-def feel_in_space(tick: Any, data: Any, qp: Any, force: Array, axes: Array, dt: float) -> None:
-    """As :func:`feel_friction`, of forces (n, 3) in the world, and a robot's ``axes`` (3, 3)."""
-    feel_friction(tick, data, qp, np.dot(force, axes), dt)
-
-
-@compiled
 def advance(kept: Any, dt: float) -> None:
     """Move the references on, write the tasks' rows and the stance, for ``dt`` [s].
 
