@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from math import isfinite
 from typing import NamedTuple
 
@@ -106,17 +105,17 @@ class Stride:
 
 def chained(*strides: Stride) -> Stride:
     """Strides, or parts of one, as one that ends as the last; each starts where one has ended."""
-    starts = [0.0, *accumulate(stride.duration for stride in strides)]
     meta = np.concatenate([stride.meta for stride in strides])
-    meta[:, 0] += np.repeat(starts[:-1], [len(stride.meta) for stride in strides])
+    events: list[FiredEvent] = []
+    row, start = 0, 0.0
+    for stride in strides:
+        meta[row : row + len(stride.meta), 0] += start
+        events += (event._replace(time=start + event.time) for event in stride.events)
+        row, start = row + len(stride.meta), start + stride.duration
     return replace(
         strides[-1],
-        duration=starts[-1],
-        events=tuple(
-            event._replace(time=start + event.time)
-            for start, stride in zip(starts, strides, strict=False)
-            for event in stride.events
-        ),
+        duration=start,
+        events=tuple(events),
         cx=np.concatenate([stride.cx for stride in strides]),
         cy=np.concatenate([stride.cy for stride in strides]),
         meta=meta,
