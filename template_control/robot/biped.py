@@ -151,7 +151,7 @@ class Biped(Robot):
         self.legs = tuple(tuple(j - first for j in leg) for leg in self._leg_joints)
         self._hinges = tuple(leg_hinges(model, leg, flat) for leg in self._leg_joints)
         self.hinges = tuple(tuple(j - first for j in leg) for leg in self._hinges)
-        straight = straight_legs(model, self._leg_joints, self._foot_ids, flat)
+        straight = straight_legs(model, feet, self.base_joints, flat)
         self.leg_length, self._neutral = straight.reach, straight.q
         check_size(path, self.mass, self.leg_length, foot_radius)
         self.joint_sign: Array = np.sign(straight.axes[1, self.base_dof :])

@@ -35,6 +35,11 @@ class StraightLegs:
     axes: Array  # (3, nv) directions of the joints' axes in the world, in q
 
 
+def is_lateral(axis: Array) -> bool:
+    """True if an axis (3,) is the lateral one, y, in either direction."""
+    return bool(abs(abs(axis[1]) - 1.0) <= _PARALLEL)
+
+
 def leg_hinges(model: pin.Model, leg: Sequence[int], flat: bool = False) -> tuple[int, ...]:
     """Pinocchio's joints that swing and bend a leg: hip and knee, its last two.
 
@@ -43,21 +48,20 @@ def leg_hinges(model: pin.Model, leg: Sequence[int], flat: bool = False) -> tupl
     """
     if not flat:
         return tuple(leg[-HINGES:])
-    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[4]
-    return tuple(j for j in leg if abs(abs(axes[model.idx_vs[j]]) - 1.0) <= _PARALLEL)
+    axes = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))[3:]
+    return tuple(j for j in leg if is_lateral(axes[:, model.idx_vs[j]]))
 
 
 def straight_legs(
-    model: pin.Model, legs: Sequence[Sequence[int]], feet: Sequence[int], flat: bool = False
+    model: pin.Model, feet: Sequence[str], base_joints: int, flat: bool = False
 ) -> StraightLegs:
     """The configuration with straight legs, from a model whose neutral trunk is upright.
 
-    ``legs`` are Pinocchio's joints from the trunk on, the last two hip and knee; ``feet`` are
-    frames. Joints above the hip are turned until its axis is lateral, if they can. A leg with a
-    ``flat`` foot has hip, knee and ankle as :func:`leg_hinges` finds them, ends at its ankle, and
-    stands on its sole, which is level where all joints are at 0.
+    The last two joints of a leg are hip and knee. Those above the hip are turned until its axis is
+    lateral, if they can. A leg with a ``flat`` foot has hip, knee and ankle as :func:`leg_hinges`
+    finds them, ends at its ankle, and stands on its sole, which is level where all joints are at 0.
     """
-    data, q = model.createData(), pin.neutral(model)
+    data, q, legs = model.createData(), pin.neutral(model), leg_joints(model, feet, base_joints)
     placing = {joint for leg in legs for joint in leg}
     for joint in range(2, model.njoints) if flat else ():
         if joint not in placing:
@@ -72,7 +76,7 @@ def straight_legs(
     for leg, foot in zip(legs, feet, strict=True):
         hip, knee, *ankle = leg_hinges(model, leg, flat)
         thigh = data.oMi[knee].translation - data.oMi[hip].translation
-        end = data.oMi[ankle[0]] if ankle else data.oMf[foot]
+        end = data.oMi[ankle[0]] if ankle else data.oMf[foot_frame(model, foot)]
         shank = end.translation - data.oMi[knee].translation
         upper, lower = hypot(thigh[0], thigh[2]), hypot(shank[0], shank[2])
         lean = atan2(-thigh[0], -thigh[2])

@@ -25,11 +25,8 @@ from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot import urdf_edits
 from template_control.robot.biped import MONOPOD, SINGLE, Biped
-from template_control.robot.requirements import (
-    add_feet,
-    check_planar,
-    check_planar_legs,
-)
+from template_control.robot.legs import is_lateral
+from template_control.robot.requirements import add_feet, check_planar, check_planar_legs
 from template_control.robot.terms import PLANAR_DOF, gather_planar
 from template_control.robot.urdf import build_model, check_bodies, end_of, named, read_urdf
 from template_control.structured import keep
@@ -226,7 +223,7 @@ def _check_axes(path: Path, robot: ET.Element, sagittal: Sequence[str]) -> Array
     for name in sagittal:
         index = model.getJointId(name)
         axis = jacobians[3:, model.joints[index].idx_v]
-        if abs(abs(axis[1]) - 1.0) > 1e-6:
+        if not is_lateral(axis):
             raise RobotError(
                 f"{path}: joint {name!r} turns about {np.round(axis, 3).tolist()} and not about"
                 " the lateral axis y: name hips and knees as sagittal_joints, and lock the others"

@@ -15,17 +15,17 @@ from template_control.robot.legs import (
     HINGES,
     add_foot_frame,
     foot_frame,
+    is_lateral,
     leg_hinges,
     leg_joints,
     straight_legs,
 )
-from template_control.robot.terms import FLOATING_DOF, LEGS, PLANAR_DOF
+from template_control.robot.terms import LEGS, PLANAR_DOF
 from template_control.robot.urdf import collision_shapes
 
 UNLIMITED = 1e20  # Pinocchio writes an absent limit as inf or as 1.8e308
 _TURNS, _DEGREES = 12.6, 360.0  # stops between two turns in radians and one in degrees
 _CLOSE = 1e-4  # [m]
-_PARALLEL = 1e-6  # 1 - cosine of the angle between two axes
 _ROOT = 1  # Pinocchio's index of the free flyer
 _LEAST, _MOST = 3, 4  # joints of a floating-base robot's leg
 _FLAT, _SWINGING = 6, 3  # joints of one with a flat foot, and those of them about y
@@ -64,7 +64,7 @@ def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
         )
     own = slice(PLANAR_DOF + 1, None)
     for (name, kind), joint in zip(joints[own], model.joints[own], strict=True):
-        if not joint.nq == joint.nv == 1 or abs(abs(columns[4, joint.idx_v]) - 1.0) > _PARALLEL:
+        if not joint.nq == joint.nv == 1 or not is_lateral(columns[3:, joint.idx_v]):
             raise RobotError(
                 f"{path} is not planar: joint {name!r} is {kind},"
                 " and must be revolute about y (with limits, not continuous)"
@@ -83,7 +83,7 @@ def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
             f"{path}: {hinges} hinges in its legs: a hip and a knee each is what is"
             f" controlled; name these {HINGES * legs} as sagittal_joints"
         )
-    _check_limits(path, model, range(PLANAR_DOF + 1, model.njoints))
+    _check_limits(path, model, PLANAR_DOF + 1)
     for joint in range(PLANAR_DOF):  # the guide only holds the robot
         if model.damping[joint] > 0.0 or model.upperDryFrictionLimit[joint] > 0.0:
             raise RobotError(
@@ -132,7 +132,7 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool
         )
     if flat:
         _check_flat(path, model, feet, legs)
-        _check_limits(path, model, range(2, model.njoints))
+        _check_limits(path, model, _ROOT + 1)
         return
     most = _MOST if len(legs) == LEGS else _LEAST
     for leg, foot in zip(legs, feet, strict=True):
@@ -142,21 +142,21 @@ def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool
                 f" {'three or four' if most > _LEAST else 'three'} are needed, the last two of"
                 " them hip and knee about the lateral axis"
             )
-    axes = straight_legs(model, legs, [foot_frame(model, foot) for foot in feet]).axes
+    axes = straight_legs(model, feet, _ROOT).axes
     for leg, foot in zip(legs, feet, strict=True):
         for joint in leg[-HINGES:]:
-            if abs(abs(axes[1, model.idx_vs[joint]]) - 1.0) > _PARALLEL:
+            if not is_lateral(axes[:, model.idx_vs[joint]]):
                 raise RobotError(
                     f"{path}: joint {model.names[joint]!r} of foot {foot!r} does not turn about the"
                     " lateral axis y, as hip and knee must, the last two joints of a leg"
                 )
-    joints = [joint for leg in legs for joint in leg]
-    if len(joints) != model.nv - FLOATING_DOF:
-        others = [name for j, name in enumerate(model.names) if j > 1 and j not in joints]
+    placing = {joint for leg in legs for joint in leg}
+    others = [name for j, name in enumerate(model.names) if j > _ROOT and j not in placing]
+    if others:
         raise RobotError(
             f"{path}: joints {others} are in no leg: make them fixed, or name them in `locked`"
         )
-    _check_limits(path, model, joints)
+    _check_limits(path, model, _ROOT + 1)
 
 
 def _check_flat(
@@ -198,9 +198,8 @@ def feet_of_legs(
         return found
     if len(feet) == LEGS:
         return ((0,), (1,))
-    legs = leg_joints(model, feet, 1)
-    data, q = model.createData(), straight_legs(model, legs, [foot_frame(model, f) for f in feet]).q
-    pin.framesForwardKinematics(model, data, q)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, straight_legs(model, feet, _ROOT).q)
     x, y = np.array([data.oMf[foot_frame(model, foot)].translation[:2] for foot in feet]).T
     first = np.flatnonzero((x > x.mean()) == (y > y.mean()))
     other = np.flatnonzero((x > x.mean()) != (y > y.mean()))
@@ -214,8 +213,9 @@ def feet_of_legs(
 _LIMITS = {"effort": "its torque limit", "velocity": "the speed [rad/s] that it can have"}
 
 
-def _check_limits(path: Path, model: pin.Model, joints: Sequence[int]) -> None:
-    """Check that joints have limits of torque and speed, and stops in radians."""
+def _check_limits(path: Path, model: pin.Model, first: int) -> None:
+    """Check that the joints from ``first`` on have limits of torque and speed, stops in radians."""
+    joints = range(first, model.njoints)
     for joint in joints:
         place = model.idx_qs[joint]
         stops = float(model.lowerPositionLimit[place]), float(model.upperPositionLimit[place])

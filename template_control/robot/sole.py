@@ -162,8 +162,7 @@ def add_soles(model: pin.Model, feet: Sequence[str], soles: Sequence[Sole]) -> t
     sole: the robot's weight then is over its toe where the trunk is upright over the ankle.
     """
     legs = leg_joints(model, feet, 1)
-    straight = straight_legs(model, legs, [foot_frame(model, foot) for foot in feet], flat=True)
-    data = model.createData()
+    straight, data = straight_legs(model, feet, 1, flat=True), model.createData()
     hinges, q = [leg_hinges(model, leg, flat=True) for leg in legs], straight.q.copy()
     for leg in hinges:
         signs = np.sign(straight.axes[1, [model.idx_vs[joint] for joint in leg]])
