@@ -228,11 +228,10 @@ class BulletPlant(EnginePlant):
                 )
                 for axis in axes
             ]
+            if forces.shape[1] == PATCH:
+                force += moment(contact[6], force)
             for i, part in enumerate(force):
                 forces[foot, i] += part
-            if forces.shape[1] == PATCH:
-                for i, part in enumerate(moment(contact[6], force), 3):
-                    forces[foot, i] += part
 
     def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""

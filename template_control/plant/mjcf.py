@@ -133,7 +133,12 @@ def _add_planar(ground: Element, robot: Biped, world: PlantOptions) -> dict[int,
             ref, hinge = float(neutral[above - 1]), above - 1 - PLANAR_DOF
             lost = _losses(robot, hinge, world.time_step) if hinge >= 0 else {}
             _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, lost=lost)
-        _add_inertia(body, model.inertias[joint], axes[3:, joint - 1], world.mass_scale)
+        # The robot turns about the axis of its hinges only, where any rotation leaves the inertia
+        # as it is. MuJoCo refuses the flat inertias of a planar model, whose other two axes have
+        # none.
+        axis, inertia = axes[3:, joint - 1], model.inertias[joint]
+        about_y = _text((world.mass_scale * (axis @ inertia.inertia @ axis),) * 3)
+        _add_inertia(body, inertia, world.mass_scale, diaginertia=about_y)
         bodies[joint] = body
     return bodies
 
@@ -154,15 +159,9 @@ def _add_floating(ground: Element, robot: Biped, world: PlantOptions) -> dict[in
             about = {"axis": _text(axis), "ref": repr(float(neutral[model.idx_qs[joint]]))}
             about |= _losses(robot, joint - 1 - _ROOT, world.time_step)
             _add(body, "joint", name=model.names[joint], type="hinge", **about)
-        inertia = model.inertias[joint]
-        i = world.mass_scale * inertia.inertia
-        _add(
-            body,
-            "inertial",
-            mass=repr(float(world.mass_scale * inertia.mass)),
-            pos=_text(inertia.lever),
-            fullinertia=_text((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2])),
-        )
+        i = world.mass_scale * model.inertias[joint].inertia
+        moments = _text((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
+        _add_inertia(body, model.inertias[joint], world.mass_scale, fullinertia=moments)
         bodies[joint] = body
     return bodies
 
@@ -223,17 +222,9 @@ def _losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
     return found
 
 
-def _add_inertia(body: Element, inertia: pin.Inertia, axis: Array, scale: float) -> None:
-    # The robot turns about the axis of its hinges only, where any rotation leaves the inertia as it
-    # is. MuJoCo refuses the flat inertias of a planar model, in which the other two axes have none.
-    about_y = scale * (axis @ inertia.inertia @ axis)
-    _add(
-        body,
-        "inertial",
-        mass=repr(float(scale * inertia.mass)),
-        pos=_text(inertia.lever),
-        diaginertia=_text((about_y, about_y, about_y)),
-    )
+def _add_inertia(body: Element, inertia: pin.Inertia, scale: float, **moments: str) -> None:
+    mass, place = repr(float(scale * inertia.mass)), _text(inertia.lever)
+    _add(body, "inertial", mass=mass, pos=place, **moments)
 
 
 def _add_ball(body: Element, name: str, centre: str, radius: float) -> None:

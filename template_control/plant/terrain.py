@@ -117,8 +117,9 @@ class Terrain(Checked):
             x, y: of the point [m].
         """
         above = y - self.height_at(x)
-        best, foot = abs(above), (x, y - above)
-        for (ax, ay), (bx, by) in self.segments(x - best, x + best):
+        best, foot, xs = abs(above), (x, y - above), self._xs
+        near = slice(max(bisect_left(xs, x - best) - 1, 0), bisect_right(xs, x + best) + 1)
+        for (ax, ay), (bx, by) in pairwise(self.points[near]):
             length = (bx - ax) ** 2 + (by - ay) ** 2
             share = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length
             share = min(max(share, 0.0), 1.0)
@@ -130,18 +131,6 @@ class Terrain(Checked):
         if best <= _LEVEL:
             return Closest(side * best, self._normal(x))
         return Closest(side * best, (side * (x - foot[0]) / best, side * (y - foot[1]) / best))
-
-    def segments(
-        self, low: float, high: float
-    ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
-        """The lines between neighbouring points that reach between two places.
-
-        Args:
-            low, high: x of the places [m].
-        """
-        xs = self._xs
-        first = max(bisect_left(xs, low) - 1, 0)
-        return list(pairwise(self.points[first : bisect_right(xs, high) + 1]))
 
     def line(self, low: float, high: float) -> list[tuple[float, float]]:
         """The ground from one place to another, as points with straight lines between them.
@@ -391,10 +380,6 @@ def terrain_from(text: str) -> Terrain:
         if key not in KINDS[kind]:
             raise ParameterError(f"{where}: {kind} takes {known}, and not {key!r}")
         given[key] = number(f"{where}: {key}", value, KINDS[kind][key])
-    return _made(where, kind, given)
-
-
-def _made(where: str, kind: str, given: dict[str, Any]) -> Terrain:
     if "angle" in given:
         given["angle"] = radians(given["angle"])
     if "shortest" in given or "longest" in given:
@@ -402,7 +387,6 @@ def _made(where: str, kind: str, given: dict[str, Any]) -> Terrain:
     try:
         return _MAKERS[kind](**given)
     except TypeError:
-        known = ", ".join(KINDS[kind])
         raise ParameterError(
             f"{where} lacks a number: {kind} takes {known}, such as step:height=0.03,x=2.5"
         ) from None
