@@ -191,8 +191,7 @@ class Workspace:
         shapes = ((2, bounded), *maps, (nu, nu), (nu,), (rows, nu), (rows,), (rows,), (nu,))
         self.matrices = problem.Matrices(limit, *(np.zeros(shape) for shape in shapes))
         self._proxqp = load_proxqp()
-        self.qp = self._new()
-        self.ready = False
+        self._warm: Any = None  # or a QP that has solved the problem of an earlier tick
 
     def _new(self) -> Any:
         dense, (rows, nu) = self._proxqp.dense, self.matrices.constraint.shape
@@ -204,28 +203,26 @@ class Workspace:
         qp.settings.max_iter = qp.settings.max_iter_in = 40
         return qp
 
-    def solve(self) -> bool:
-        """Solve for the current matrices; warm, and once more from scratch if that fails."""
-        m, solved = self.matrices, self._proxqp.QPSolverOutput.PROXQP_SOLVED
-        guess = self._proxqp.InitialGuess
-        if self.ready:
-            self.qp.update(g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
-            self.qp.solve()
-            if self.qp.results.info.status == solved:
-                return True
-            # A failed solve leaves penalties behind with which the next one can stop at a
-            # wrong answer, even after `init`; a new object costs microseconds.
-            self.qp = self._new()
-        self.qp.settings.initial_guess = guess.NO_INITIAL_GUESS
-        identity = np.eye(len(m.gradient))
-        self.qp.init(H=identity, g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
-        self.qp.solve()
-        self.ready = bool(self.qp.results.info.status == solved)
-        if self.ready:
-            self.qp.settings.initial_guess = guess.WARM_START_WITH_PREVIOUS_RESULT
-        else:
-            self.qp = self._new()
-        return self.ready
+    def solve(self) -> Array | None:
+        """The w of least cost, by a warm start, else from scratch; None where none is found."""
+        m, qp, proxqp = self.matrices, self._warm, self._proxqp
+        solved, guess = proxqp.QPSolverOutput.PROXQP_SOLVED, proxqp.InitialGuess
+        if qp is not None:
+            qp.update(g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
+            qp.solve()
+            if qp.results.info.status == solved:
+                return np.asarray(qp.results.x)
+        # A failed solve leaves penalties behind with which the next one can stop at a wrong answer,
+        # even after `init`; a new object costs microseconds.
+        self._warm, qp = None, self._new()
+        qp.settings.initial_guess = guess.NO_INITIAL_GUESS
+        qp.init(H=np.eye(len(m.gradient)), g=m.gradient, C=m.constraint, l=m.lower, u=m.upper)
+        qp.solve()
+        if qp.results.info.status != solved:
+            return None
+        qp.settings.initial_guess = guess.WARM_START_WITH_PREVIOUS_RESULT
+        self._warm = qp
+        return np.asarray(qp.results.x)
 
 
 class WholeBodyQp:
@@ -342,7 +339,7 @@ class WholeBodyQp:
     ) -> tuple[float, bool]:
         """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
         now, robot, braked = self.data[0], self.robot, kind == problem.BRAKED
-        contacts, seconds, solved = int(now["contacts"]), 0.0, False
+        contacts, seconds = int(now["contacts"]), 0.0
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
         slacks = (-np.inf, 0.0, None) if braked else (None,)
         for slack in slacks:
@@ -352,14 +349,13 @@ class WholeBodyQp:
             if braked:
                 state = now, robot.data[0], robot.arrays
                 kind = problem.assemble(*state, tasks.table, w.matrices)
-            best, solved = w.matrices.minimum, kind == problem.FREE
-            if not solved:
+            best = w.matrices.minimum if kind == problem.FREE else None
+            if best is None:
                 tasks.check_finite()  # with such a number no constraint is kept
                 start = time.perf_counter()
-                solved = kind != problem.SINGULAR and w.solve()
+                best = None if kind == problem.SINGULAR else w.solve()
                 seconds += time.perf_counter() - start
-                best = w.qp.results.x
-            if solved:
+            if best is not None:
                 problem.torques(w.matrices, best, self._torque)
                 break
         else:
@@ -373,4 +369,4 @@ class WholeBodyQp:
                 )
             np.clip(self._torque, -self._limit, self._limit, out=self._torque)
         problem.answer(now, w.matrices, self._torque, found)
-        return seconds, solved
+        return seconds, best is not None
