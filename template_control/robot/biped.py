@@ -20,7 +20,7 @@ from template_control.robot.legs import (
     middle,
     straight_legs,
 )
-from template_control.robot.requirements import add_feet, check_size, feet_of_legs
+from template_control.robot.requirements import check_size, feet_of_legs
 from template_control.robot.robot import Robot
 from template_control.robot.sole import Patch
 from template_control.robot.terms import FLOATING_DOF, UP, sources
@@ -273,10 +273,8 @@ class Biped(Robot):
             urdf = with_masses(self.path, urdf, masses)
             model = build_model(self.path, urdf, self.base_dof == FLOATING_DOF)
             model.name = self.name
-            for foot, patch in zip(self.feet, self.patches, strict=False):
-                add_foot_frame(model, foot, patch.placement)
-            if not self.patches:
-                add_feet(self.path, urdf, model, self.feet)
+            for foot, frame in zip(self.feet, self._foot_ids, strict=True):
+                add_foot_frame(model, foot, self.model.frames[frame].placement)
         model.gravity.linear = np.array([0.0, 0.0, -(gravity or self.gravity)])
         same = self.feet, self.foot_radius, self.walk
         legs = feet_of_legs(self.path, model, self.feet, groups) if groups else self.groups
