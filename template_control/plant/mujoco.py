@@ -18,9 +18,10 @@ from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.plant.world import EnginePlant
 from template_control.robot.biped import Biped
-from template_control.robot.terms import FLOATING_DOF, PATCH, UP
+from template_control.robot.terms import PATCH, UP
 
-_POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
+# Where MuJoCo has the place of a floating base, whose quaternion begins with w, and its velocity.
+_PLACE, _SPEED = [0, 1, 2, 4, 5, 6, 3], [0, 1, 2, 3, 4, 5]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,9 +87,11 @@ class MujocoPlant(EnginePlant):
             raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
         self.data = engine.MjData(self.model)
         # Joints of one number each: all of a planar robot's, but not a floating base.
-        names = list(robot.model.names)[2 if robot.base_joints == 1 else 1 :]
-        self._q = np.array([self.model.joint(name).qposadr[0] for name in names])
-        self._v = np.array([self.model.joint(name).dofadr[0] for name in names])
+        floats = robot.directions > UP
+        joints = [self.model.joint(n) for n in list(robot.model.names)[2 if floats else 1 :]]
+        place, speed = (_PLACE, _SPEED) if floats else ([], [])
+        self._q = np.array([*place, *(joint.qposadr[0] for joint in joints)])
+        self._v = np.array([*speed, *(joint.dofadr[0] for joint in joints)])
         self._actuated = self._v[-len(robot.joint_names) :]
         self._trunk = self.model.body(TRUNK).id
         shapes = [self.model.geom(i).name for i in range(self.model.ngeom)]
@@ -158,20 +161,15 @@ class MujocoPlant(EnginePlant):
 class FloatingBaseMujocoPlant(MujocoPlant):
     """As :class:`MujocoPlant`, for a floating-base robot.
 
-    MuJoCo has the trunk's velocity in the world and its angular velocity in the trunk's axes, and
-    quaternions begin with w.
+    MuJoCo has the trunk's velocity in the world and its angular velocity in the trunk's axes.
     """
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
-        super().reset(q[_POSITION:], v[FLOATING_DOF:])
-        rotation = pin.Quaternion(q[3:_POSITION]).matrix()
-        self.data.qpos[:3], self.data.qpos[3:7] = q[:3], q[[6, 3, 4, 5]]
-        self.data.qvel[:3], self.data.qvel[3:6] = rotation @ v[:3], v[3:FLOATING_DOF]
+        super().reset(q, v)
+        self.data.qvel[:3] = pin.Quaternion(q[3:7]).matrix() @ v[:3]
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
-        super().read(q[_POSITION:], v[FLOATING_DOF:])
-        q[:3], q[3:_POSITION] = self.data.qpos[:3], self.data.qpos[[4, 5, 6, 3]]
-        rotation = pin.Quaternion(q[3:_POSITION]).matrix()
-        v[:3], v[3:FLOATING_DOF] = rotation.T @ self.data.qvel[:3], self.data.qvel[3:6]
+        super().read(q, v)
+        v[:3] = pin.Quaternion(q[3:7]).matrix().T @ self.data.qvel[:3]
