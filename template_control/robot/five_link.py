@@ -126,14 +126,15 @@ class FiveLink(Checked):
         (hip, knee), speed, lateral = self.torque_limit, self.velocity_limit, "0 1 0"
         hip_limit, knee_limit = (*self.hip_range, hip, speed), (*self.knee_range, knee, speed)
         bend, end = f"0 0 {-thigh.length:g}", f"0 0 {-shank.length:g}"
-        foot_ball = _ball(self.foot_radius)
+        foot_ball = _shape(f'sphere radius="{self.foot_radius:g}"')
         for side, (colour, place) in _SIDES.items():
             parent, origin = "trunk", f"0 {place * self.hip_width:g} 0"
             upper, lower, foot = f"{side}_thigh", f"{side}_shank", f"{side}_foot"
             if block is not None:
                 name, moments = f"{side}_block", (_BALL * block.mass * block.radius**2,) * 3
                 inertial = _inertial(0.0, block.mass, moments)
-                links.append(_link(name, inertial, _ball(block.radius), colour))
+                hip_ball = _shape(f'sphere radius="{block.radius:g}"')
+                links.append(_link(name, inertial, hip_ball, colour))
                 limit = (*block.range, block.torque_limit, block.velocity_limit)
                 ends = (f"{side}_abduction", "revolute", parent, name)
                 joints.append(_joint(*ends, "1 0 0", origin, limit))
@@ -181,10 +182,6 @@ def _shape(kind: str, height: float | None = None) -> str:
     return f"{place}<geometry><{kind}/></geometry>"
 
 
-def _ball(radius: float) -> str:
-    return _shape(f'sphere radius="{radius:g}"')
-
-
 def _rod(link: Link) -> str:
     size = f'radius="{0.1 * link.length:g}" length="{link.length:g}"'
     return _shape(f"cylinder {size}", -0.5 * link.length)
@@ -204,19 +201,17 @@ def _joint(
     child: str,
     axis: str = "",
     origin: str = "0 0 0",
-    limit: tuple[float, float, float, float] | None = None,
+    limit: tuple[float, ...] = (),
 ) -> str:
-    """A joint; ``limit``: lower, upper [rad], effort [N m], velocity [rad/s]."""
+    """A joint; ``limit``, with an axis: lower, upper [rad], effort [N m], velocity [rad/s]."""
     text = (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'\n  <origin xyz="{origin}"/>'
     )
     if axis:
-        text += f'<axis xyz="{axis}"/>'
-    if limit is not None:
         lower, upper, effort, velocity = limit
         text += (
-            f'<limit lower="{lower:g}" upper="{upper:g}" effort="{effort:g}"'
+            f'<axis xyz="{axis}"/><limit lower="{lower:g}" upper="{upper:g}" effort="{effort:g}"'
             f' velocity="{velocity:g}"/>'
         )
     return text + "</joint>"
