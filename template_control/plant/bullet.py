@@ -26,7 +26,7 @@ from template_control.plant.world import EnginePlant, WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
-from template_control.robot.urdf import link_masses
+from template_control.robot.urdf import mass_of, named
 from template_control.warm_up import Part, ready
 
 _CLOSE = 1e-6  # of the robot's mass
@@ -133,13 +133,13 @@ class BulletPlant(EnginePlant):
 
     def _compare_masses(self, links: Mapping[str, int]) -> None:
         """Check that the robot weighs here what it weighs in its model."""
-        masses = link_masses(self.robot.urdf)
+        given = named(ElementTree.fromstring(self.robot.urdf), "link")
         for link, index in links.items():
-            mass = self._world.getDynamicsInfo(self.body, index)[0]
-            if abs(mass - masses[link]) > _CLOSE * self.robot.mass:
+            mass, wanted = self._world.getDynamicsInfo(self.body, index)[0], mass_of(given[link])
+            if abs(mass - wanted) > _CLOSE * self.robot.mass:
                 raise RobotError(
                     f"{self.robot.path}: link {link!r} weighs {mass:g} kg in PyBullet and"
-                    f" {masses[link]:g} kg in the URDF: give it an <inertial> with its mass"
+                    f" {wanted:g} kg in the URDF: give it an <inertial> with its mass"
                 )
 
     def _mass_matrix(self, q: Array) -> Array:

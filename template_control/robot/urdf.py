@@ -153,11 +153,6 @@ def tensor_of(link: ET.Element) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def link_masses(urdf: str) -> dict[str, float]:
-    """Mass of each link by its name [kg], 0 without ``<inertial>``."""
-    return {name: mass_of(link) for name, link in named(ET.fromstring(urdf), "link").items()}
-
-
 def check_bodies(path: Path, robot: ET.Element, model: pin.Model, first: int) -> None:
     """Check that whatever a joint moves weighs something, from Pinocchio's joint ``first`` on."""
     joints = named(robot, "joint")
