@@ -159,7 +159,7 @@ def planarise(
     sagittal_joints: Sequence[str],
     locked: Mapping[str, float],
     foot_radius: float | None,
-    foot_offset: Sequence[float] | None = None,
+    foot_offset: Sequence[float] | None,
 ) -> None:
     """Make a 3D URDF a planar one, in place; arguments as of :meth:`PlanarBiped.from_urdf`."""
     if len(set(sagittal_joints)) != _SAGITTAL:

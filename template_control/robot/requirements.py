@@ -47,7 +47,7 @@ def _legs_apart(path: Path, model: pin.Model, feet: Sequence[str], base: int) ->
     return legs
 
 
-def check_planar(path: Path, model: pin.Model, legs: int = LEGS) -> None:
+def check_planar(path: Path, model: pin.Model, legs: int) -> None:
     """Check that base and legs are those of a planar biped with hips and knees, and have limits."""
     joints = [
         (name, joint.shortname()) for name, joint in zip(model.names, model.joints, strict=True)
@@ -113,7 +113,7 @@ def check_planar_legs(path: Path, model: pin.Model, feet: Sequence[str]) -> None
             )
 
 
-def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool = False) -> None:
+def check_floating(path: Path, model: pin.Model, feet: Sequence[str], flat: bool) -> None:
     """Check that the legs of a robot with a free flyer place their feet, or turn ``flat`` ones."""
     if len(feet) not in (LEGS, 2 * LEGS):
         raise RobotError(

@@ -155,7 +155,7 @@ def spheres(
     robot: ET.Element,
     feet: Sequence[str],
     radius: float | None,
-    offset: Sequence[float] | None = None,
+    offset: Sequence[float] | None,
 ) -> None:
     """Leave collision shapes to the feet alone, and give them spheres of this radius [m].
 
@@ -280,7 +280,9 @@ def gather_inertias(robot: ET.Element) -> None:
                 total += frame.act(_inertia(links[other]))
         if total.mass > 0.0:
             for link in frames:
-                _set_inertia(links[link], total if link == name else None)
+                for old in links[link].findall("inertial"):
+                    links[link].remove(old)
+            _add_inertia(links[name], total)
 
 
 def _fixed_links(robot: ET.Element, link: str) -> dict[str, pin.SE3]:
@@ -310,12 +312,8 @@ def _inertia(link: ET.Element) -> pin.Inertia:
     return _placement(link.find("inertial")).act(own)
 
 
-def _set_inertia(link: ET.Element, inertia: pin.Inertia | None) -> None:
-    """Replace a link's ``<inertial>``; None: it has none."""
-    for old in link.findall("inertial"):
-        link.remove(old)
-    if inertia is None:
-        return
+def _add_inertia(link: ET.Element, inertia: pin.Inertia) -> None:
+    """Give a link without ``<inertial>`` one."""
     inertial = ET.SubElement(link, "inertial")
     # Python's own digits: no other text gives the same number again, in no locale.
     ET.SubElement(inertial, "origin", xyz=" ".join(map(repr, inertia.lever.tolist())))
