@@ -65,10 +65,7 @@ def state_in(robot: PlanarBiped, pose: Pose) -> tuple[Array, Array]:
     q = _bent_to(robot, pose, _planar_configuration, (np.inf, _SHORT))
     robot.update(q, np.zeros(robot.nv))
     feet, speeds = _feet(robot, pose, pose.feet_velocity)
-    rows = np.zeros((robot.nv, robot.nv))
-    rows[0:2] = robot.com_jacobian
-    rows[2, 2] = 1.0
-    rows[3:] = robot.foot_jacobian[feet].reshape(-1, robot.nv)
+    rows = _placing_rows(robot, feet)
     momentum = _angular_momentum_row(robot, q)
     if pose.momentum_speed:
         rows[0] += momentum / (robot.mass * pose.com[1])
@@ -226,16 +223,18 @@ def _planar_configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: flo
         return np.concatenate((robot.com - pose.com, [q[2] - pose.pitch], away))
 
     def step(_: Array, error: Array) -> Array:
-        rows = np.zeros((robot.nv, robot.nv))
-        rows[0:2] = robot.com_jacobian
-        rows[2, 2] = 1.0
-        for i, foot in enumerate(feet):
-            rows[3 + 2 * i : 5 + 2 * i] = robot.foot_jacobian[foot]
-            # The lowest point's path, not that of the material point which touches there.
-            rows[3 + 2 * i] += robot.foot_radius * robot.foot_turning[foot]
+        rows = _placing_rows(robot, feet)
+        # The lowest point's path, not that of the material point which touches there.
+        rows[3::2] += robot.foot_radius * robot.foot_turning[feet]
         return _solved(robot, rows, -error)
 
     return _newton(robot, q, error, step, longest, 50)
+
+
+def _placing_rows(robot: PlanarBiped, feet: Sequence[int]) -> Array:
+    """(nv, nv) Jacobians of the CoM, the trunk's pitch and these feet, x before y."""
+    of_feet = robot.foot_jacobian[feet].reshape(-1, robot.nv)
+    return np.vstack((robot.com_jacobian, np.eye(robot.nv)[2], of_feet))
 
 
 def _feet(robot: PlanarBiped, pose: Pose, values: Array) -> tuple[list[int], Array]:
