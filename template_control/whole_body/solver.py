@@ -32,7 +32,6 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.robot.robot import Robot
 from template_control.slip.similarity import RATE, TIME, tuned
-from template_control.structured import Number
 from template_control.whole_body import problem
 from template_control.whole_body.stack import TaskStack
 
@@ -236,8 +235,6 @@ class WholeBodyQp:
         torque_limit: (nu,) that may be used [N m].
         data: (1,) of ``QP_DATA``: the stance, for compiled code.
     """
-
-    friction = Number("friction")
 
     @checked
     def __init__(self, robot: Robot, options: QpOptions | None = None) -> None:

@@ -51,14 +51,8 @@ class CompiledTask(Checked):
         weight = self.weight  # type: ignore[attr-defined]
         return weight if isinstance(weight, tuple) else (weight,)
 
-    @property
-    def numbers(self) -> tuple[float, ...]:
-        """Gains, as the formula reads them: all numbers but the weights, in the fields' order."""
-        names = (f.name for f in fields(self) if f.name not in _NO_GAINS)  # type: ignore[arg-type]
-        return tuple(float(number) for name in names for number in np.ravel(getattr(self, name)))
-
     def compiled(self, first: int) -> Any:
-        """(1,) of ``TASK``.
+        """(1,) of ``TASK``; its gains are all numbers but the weights, in the fields' order.
 
         Args:
             first: row of the stack.
@@ -68,7 +62,9 @@ class CompiledTask(Checked):
         found["leg"], found["contact"] = getattr(self, "leg", 0), getattr(self, "contact", 0)
         weights = self.weights[: found["weight"].shape[1]]
         found["weight"][0, : len(weights)] = weights
-        found["gains"][0, : len(self.numbers)] = self.numbers
+        names = (f.name for f in fields(self) if f.name not in _NO_GAINS)  # type: ignore[arg-type]
+        gains = [number for name in names for number in np.ravel(getattr(self, name))]
+        found["gains"][0, : len(gains)] = gains
         return found
 
     def check(self, robot: Robot) -> None:
