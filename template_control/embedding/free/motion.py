@@ -257,7 +257,8 @@ class LateralMotion:
         planner, gait = self.planner, supervisor.planner.gait
         planner.data["section_began"] = time
         if not _steps(gait):
-            return self._stand(section, node, supervisor)
+            self._stand(section, supervisor)
+            return node
         scale, turning = self._scale, TURN_RAMP if node.stance else RUN_RAMP
         turn_ramp = TURN_RAMPS.get(gait.stride, turning) / scale.time**2
         ramps = np.array([SIDE_RAMP * scale.length / scale.time**2, turn_ramp, turn_ramp])
@@ -304,7 +305,7 @@ class LateralMotion:
         turns = min(max(course.away(self.robot) / constant, -fastest), fastest)
         return np.array([course.left, course.turning, turns])
 
-    def _stand(self, section: Section, node: Node, supervisor: StrideSupervisor) -> Node:
+    def _stand(self, section: Section, supervisor: StrideSupervisor) -> None:
         """A stride that leads to a stand, or from it to a walk: it goes straight on.
 
         A foot that lands in it goes to where the last gait's would, or after a walk to the left,
@@ -320,7 +321,6 @@ class LateralMotion:
         self._turn_trunk(1.0, 0.0)
         planner.aim(self._side(self._feet.landed))
         planner.due = supervisor.time_of(Event.TOUCHDOWN)
-        return node
 
     def _turn_trunk(self, duration: float, time: float, speed: float = 0.0) -> None:
         """Turn the trunk in the stride that begins, as much as the axes turn at its end.
