@@ -5,16 +5,30 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from math import cos, sin
 from typing import Any
 
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
+from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.experiment import PreparedExperiment
 from template_control.run.options import Push
 from template_control.run.velocity import Velocity, VelocityCommand, check_direction
+
+
+def plant_force(robot: Biped, along: float, lateral: float) -> tuple[float, ...]:
+    """A push, forward and to the left [N], as the robot's plant takes it after the torques.
+
+    What holds a planar robot bears what is lateral; else it is along the world's x and y, and
+    forward is the heading.
+    """
+    if not isinstance(robot, FloatingBaseBiped):
+        return (along,)
+    cosine, sine = cos(robot.heading), sin(robot.heading)
+    return cosine * along - sine * lateral, sine * along + cosine * lateral
 
 
 class Hand:

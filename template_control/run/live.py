@@ -29,13 +29,13 @@ from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
-from template_control.run.backends import FloatingBackend, PlanarBackend, RobotBackend
 from template_control.run.experiment import Experiment, PreparedExperiment
-from template_control.run.hand import Hand
+from template_control.run.hand import Hand, plant_force
 from template_control.run.metadata import conditions
 from template_control.run.record import Record
 from template_control.run.recorder import RECORD, Recorder
-from template_control.run.sensing import ContactSensors, Senses
+from template_control.run.sensing import ContactSensors, Senses, senses_of
+from template_control.run.start import start
 from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
@@ -141,7 +141,10 @@ class LiveRun:
         ready(COMPILED)
         self._given = experiment
         self._o = o = experiment.prepare()
-        self._backend = _backend(o.robot)
+        if not isinstance(o.robot, PlanarBiped | FloatingBaseBiped):
+            raise ParameterError(
+                f"{o.robot!r} is of no kind that can be run: give a planar or a free biped"
+            )
         self.controller = _controller(o)
         supervisor = self.controller.supervisor
         self.endless = o.steps is None and supervisor.route.endless
@@ -151,8 +154,8 @@ class LiveRun:
             parts = (o.motion, supervisor.route, *supervisor.planners.values())
             stack.enter_context(exclusive(o.robot, *parts, *o.planners.values()))
             _check_template(o.robot, self.controller.parameters)
-            q, v = self._backend.start(self.controller, o)
-            senses = self._backend.senses(self.controller, o)
+            q, v = start(self.controller, o)
+            senses = senses_of(self.controller, o.sensors, o.world.time_step)
             _LOG.info("%s in %s: %r", o.robot.name, plant_name(o.world), self.controller.planner)
             dt = o.world.time_step
             kept = None if keep is None else max(round(keep / dt), 1)
@@ -250,7 +253,7 @@ class LiveRun:
                 hand.act(now)
             plant.read(q, v)
             plant.contact_forces(forces)
-            start = time.perf_counter()
+            begin = time.perf_counter()
             try:
                 own = np.ascontiguousarray(forces[:, : robot.directions])
                 touching, felt = contacts.measure(own)
@@ -262,7 +265,7 @@ class LiveRun:
             except DivergedError as error:
                 self.reason = f"the simulation diverged at {now:.3f} s: {error}"
                 return
-            seconds = time.perf_counter() - start
+            seconds = time.perf_counter() - begin
             failures.tick(solution.solved, now)
             senses.expect(solution.acceleration)
             if len(begun) <= len(supervisor.log):
@@ -282,7 +285,7 @@ class LiveRun:
             push = along, lateral
             yield Tick(tick, now, done, q, v, forces, push=push, solution=solution)
             try:
-                force = self._backend.force(*push) if along or lateral else ()
+                force = plant_force(robot, *push) if along or lateral else ()
                 torques.extend([solution.torque] * (1 if torques else o.delay_ticks + 1))
                 plant.step(torques[0], *force)
             except DivergedError as error:
@@ -304,15 +307,6 @@ def _check_template(robot: Biped, given: SlipParameters) -> None:
 
 def _text(p: SlipParameters) -> str:
     return f"{p.mass:.4g} kg, l0 = {p.rest_length:.4g} m and g = {p.gravity:.4g} m/s^2"
-
-
-def _backend(robot: Biped) -> RobotBackend:
-    """Parts of a run that depend on the robot's base; a ParameterError if it is of neither kind."""
-    if isinstance(robot, PlanarBiped):
-        return PlanarBackend(robot)
-    if isinstance(robot, FloatingBaseBiped):
-        return FloatingBackend(robot)
-    raise ParameterError(f"{robot!r} is of no kind that can be run: give a planar or a free biped")
 
 
 def _controller(o: PreparedExperiment) -> EmbeddingController:

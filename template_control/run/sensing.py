@@ -10,11 +10,15 @@ import numpy as np
 from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
+from template_control.embedding.controller import EmbeddingController
+from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter
-from template_control.estimation.imu import ImuOptions
+from template_control.estimation.imu import ImuOptions, ImuSensors
 from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.planar_biped import PlanarBiped
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale
 
@@ -148,3 +152,22 @@ class FilteredSensors:
     def expect(self, acceleration: Array) -> None:
         """See :meth:`Senses.expect`."""
         self._expected = acceleration
+
+
+def senses_of(
+    controller: EmbeddingController, options: SensorOptions | ImuOptions, dt: float
+) -> Senses:
+    """Sensors and estimators that give a controller its state every ``dt`` [s]."""
+    robot, template, tuning = controller.robot, controller.parameters, controller.options
+    assert isinstance(robot, PlanarBiped | FloatingBaseBiped)
+    if isinstance(options, ImuOptions):
+        # On a model of its own: the controller's may be turned.
+        return ImuSensors(options, robot.changed(), Scale.of(template), dt)
+    sensors = Sensors(options, robot, template)
+    if isinstance(robot, PlanarBiped):
+        return ForeseeingSensors(sensors, DelayCompensation(tuning.delay, robot, dt))
+    assert isinstance(tuning, FreeOptions)
+    if sensors.exact or tuning.noise_filter is None:
+        return sensors
+    noise_filter = NoiseFilter(robot, np.array(sensors.deviations), tuning.noise_filter)
+    return FilteredSensors(sensors, noise_filter, dt)

@@ -10,10 +10,10 @@ from template_control.embedding.free.options import FREE_PLANNER
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.robot.start import state_at_vlo
-from template_control.run.backends import FloatingBackend
 from template_control.run.experiment import Experiment
 from template_control.run.record import FloatingRecord
 from template_control.run.simulation import simulate
+from template_control.run.start import start
 
 STEPS = 2
 DT = 1e-3
@@ -54,11 +54,10 @@ def planar(default_gait):
 def floating():
     """Recorder and snapshots of a floating-base walk of Bolt."""
     robot = tc.load_floating_robot("bolt")
-    backend = FloatingBackend(robot)
     planner = tc.LqrPlanner(tc.robot_gait_for_speed(robot, 0.6), FREE_PLANNER)
     options = Experiment(robot, planner=planner).prepare()
     controller = tc.EmbeddingController(robot, planner, options.tuning)
-    q, v = backend.start(controller, options)
+    q, v = start(controller, options)
     with FloatingBaseBulletPlant(robot, PlantOptions()) as plant:
         return looped(controller, plant, q, v)
 

@@ -11,7 +11,7 @@ from template_control.cli.experiment_options import experiment_from
 from template_control.errors import ParameterError
 from template_control.plant.bullet import FloatingBaseBulletPlant
 from template_control.plant.mujoco import FloatingBaseMujocoPlant
-from template_control.run.backends import FloatingBackend, PlanarBackend
+from template_control.run.hand import plant_force
 
 FORCE = (8.0, -5.0)  # [N] along x and y
 
@@ -49,11 +49,11 @@ def test_a_push_gives_its_impulse_to_the_whole_robot(bolt, plant_of):
 
 def test_forward_is_the_heading(bolt):
     bolt.face(radians(30.0), np.zeros(2))
-    forward, left = FloatingBackend(bolt).force(1.0, 0.0), FloatingBackend(bolt).force(0.0, 1.0)
+    forward, left = plant_force(bolt, 1.0, 0.0), plant_force(bolt, 0.0, 1.0)
     np.testing.assert_allclose(forward, (cos(radians(30.0)), sin(radians(30.0))))
     np.testing.assert_allclose(left, (-sin(radians(30.0)), cos(radians(30.0))))
     bolt.face(0.0, np.zeros(2))
-    assert PlanarBackend(tc.load_robot("five-link")).force(3.0, 0.0) == (3.0,)
+    assert plant_force(tc.load_robot("five-link"), 3.0, 0.0) == (3.0,)
 
 
 def test_the_command_line_tells_a_direction(understood, refused):

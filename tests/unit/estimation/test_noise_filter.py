@@ -10,8 +10,7 @@ import template_control as tc
 from template_control.embedding import FREE_PLANNER, EmbeddingController, FreeOptions
 from template_control.estimation import NoiseFilter, NoiseFilterOptions
 from template_control.robustness.severity_sweep import gait_errors
-from template_control.run.backends import FloatingBackend
-from template_control.run.sensing import FilteredSensors, Sensors
+from template_control.run.sensing import FilteredSensors, Sensors, senses_of
 
 DT = 1e-3
 DEVIATION = np.array([1e-3, 0.02])
@@ -96,7 +95,7 @@ def test_a_jolt_of_the_joints_is_believed_at_a_touchdown_only(bolt):
 def senses(robot, sensors, tuning=None):
     gait = tc.robot_gait_for_speed(robot, 0.55)
     controller = EmbeddingController(robot, tc.LqrPlanner(gait, FREE_PLANNER), tuning)
-    return FloatingBackend(robot).senses(controller, tc.Experiment(sensors=sensors))
+    return senses_of(controller, sensors, DT)
 
 
 def test_only_noise_is_filtered(bolt):

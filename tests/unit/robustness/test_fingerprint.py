@@ -98,7 +98,7 @@ def test_a_trial_imports_no_room_that_does_not_count():
     code = """
 import sys
 import template_control.run.experiment, template_control.robustness.disturbances
-import template_control.robustness.fall_cause, template_control.run.backends
+import template_control.robustness.fall_cause, template_control.run.live
 print(*{name.split(".")[1] for name in sys.modules if name.startswith("template_control.")})
 """
     rooms = set(_told(code, "0").split())
