@@ -107,7 +107,7 @@ def check(
     ``where`` names the value in the message of ``error``, which says what would fit.
     """
     try:
-        return _fit(value, hint)
+        return fitter(hint)(value)
     except Refused as refused:
         raise error(f"{where} is {shown(value)}: give {refused}") from None
 
@@ -122,11 +122,6 @@ def fitter(hint: Any) -> Callable[[Any], Any]:
     if known is None:
         known = _PLANS[id(hint)] = hint, _plan(hint)  # held here, its identity stays its own
     return known[1]
-
-
-def _fit(value: Any, hint: Any) -> Any:
-    """See :func:`check`; raises :class:`Refused`."""
-    return fitter(hint)(value)
 
 
 def _plan(hint: Any) -> Callable[[Any], Any]:
@@ -222,7 +217,7 @@ def _one_of(value: Any, hints: tuple[Any, ...]) -> Any:
     reasons: dict[str, None] = {}  # that of None is the last
     for hint in sorted(hints, key=lambda hint: hint is type(None)):
         try:
-            return _fit(value, hint)
+            return fitter(hint)(value)
         except Refused as refused:
             reasons[str(refused)] = None
     raise Refused(" or ".join(reasons))
@@ -245,7 +240,7 @@ def _tuple(value: Any, hint: Any) -> tuple[Any, ...]:
         raise Refused(words_for(hint))
     each = [hints[0]] * len(items) if many else hints
     try:
-        found = tuple(_fit(item, h) for item, h in zip(items, each, strict=True))
+        found = tuple(fitter(h)(item) for item, h in zip(items, each, strict=True))
     except Refused as refused:
         raise Refused(f"{words_for(hint)}; each {refused}" if many else words_for(hint)) from None
     unchanged = isinstance(value, tuple) and all(a is b for a, b in zip(found, value, strict=True))
@@ -266,9 +261,9 @@ def _mapping(value: Any, hint: Any) -> Any:
     for key, entry in value.items():
         where = "each key "
         try:
-            fitted = _fit(key, key_hint)
+            fitted = fitter(key_hint)(key)
             where = f"{key} is {shown(entry)}, which should be "
-            found[fitted] = _fit(entry, value_hint)
+            found[fitted] = fitter(value_hint)(entry)
         except Refused as refused:
             raise Refused(f"{words_for(hint)}; {where}{refused}") from None
     same = all(found.get(key) is entry for key, entry in value.items())

@@ -10,7 +10,10 @@ from template_control.arrays import Array
 
 
 class Range(NamedTuple):
-    """Range of numbers, without its ends if ``above``, ``below``; ``endless`` has an inf end."""
+    """Range of numbers, without its ends if ``above``, ``below``; ``endless`` has an inf end.
+
+    It has no ends, or a lower one, or both; ``above`` alone is 0.
+    """
 
     low: float = -math.inf
     high: float = math.inf
@@ -27,21 +30,14 @@ class Range(NamedTuple):
 
     def words(self, what: str) -> str:
         """Of numbers in the range, for a message; ``what`` is "number" or "whole number"."""
-        low, high = math.isfinite(self.low), math.isfinite(self.high)
-        if not low and not high:
+        if self.low == -math.inf:
             return f"a finite {what}" if what == "number" else f"a {what}"
-        if self.low == 0.0 and self.above and not high:
-            return f"a positive {what}"
-        if not high:
-            return f"a {what} {'above' if self.above else 'from'} {_plain(self.low)}" + (
-                "" if self.above else " up"
-            )
-        if not low:
-            return f"a {what} {'below' if self.below else 'up to'} {_plain(self.high)}"
-        first = f"{'above' if self.above else 'from'} {_plain(self.low)}"
-        to = "to" if not self.above else "and up to"
-        last = f"{'and below' if self.below else to} {_plain(self.high)}"
-        return f"a {what} {first} {last}"
+        if self.high == math.inf:
+            return f"a positive {what}" if self.above else f"a {what} from {_plain(self.low)} up"
+        if not self.above:
+            return f"a {what} from {_plain(self.low)} to {_plain(self.high)}"
+        end = "below" if self.below else "up to"
+        return f"a {what} above {_plain(self.low)} and {end} {_plain(self.high)}"
 
 
 def _plain(end: float) -> str:
