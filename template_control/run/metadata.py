@@ -40,29 +40,22 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
         "plant": "",
         "options": {"plant": {}, "embedding": controller.options},
     }
-    return {name: to_jsonable(value, _described) for name, value in found.items()}
+    return to_jsonable(found, _described)
 
 
 def conditions(o: Experiment) -> dict[str, Any]:
     """Conditions of a simulation; a plant of one's own is not data."""
-    options = {
-        _NAMES.get(f.name, f.name): to_jsonable(getattr(o, f.name), _described)
-        for f in fields(o)
-        if f.name not in _APART
-    }
+    given = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in _APART}
+    options = {_NAMES.get(name, name): value for name, value in given.items()}
     if not isinstance(o.world, WorldOptions):
         options["plant"] = {}
-    return {"plant": plant_name(o.world), "options": options}
+    return {"plant": plant_name(o.world), "options": to_jsonable(options, _described)}
 
 
 def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, Any]:
     """Facts of a run so far; ``figures`` are over its ticks."""
-    found = {
-        **_gait(controller),
-        "arrived": controller.supervisor.arrived,
-        "summary": figures,
-    }
-    return {name: to_jsonable(value, _described) for name, value in found.items()}
+    arrived = controller.supervisor.arrived
+    return to_jsonable({**_gait(controller), "arrived": arrived, "summary": figures}, _described)
 
 
 _APART = ("robot", "motion", "planner", "automaton")
