@@ -123,20 +123,13 @@ def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
     )
 
 
-def _together(counted: list[Counts]) -> Counts:
-    """Counts over all ticks of several blocks."""
-    fields = dict(zip(Counts._fields, map(np.array, zip(*counted, strict=True)), strict=True))
-    largest = {name: fields.pop(name).max(axis=0) for name in ("torque", "speed", "error", "most")}
-    return Counts(
-        **largest,
-        least=fields.pop("least").min(axis=0),
-        **{name: values.sum(axis=0) for name, values in fields.items()},
-    )
+_EXTREMES = {"torque": np.max, "speed": np.max, "error": np.max, "most": np.max, "least": np.min}
 
 
 def statistics(counted: list[Counts], robot: Biped, torque_limit: Array) -> Statistics:
     """Statistics of a run from the counts of its blocks, one at least; limits (nu,) in N m."""
-    found = _together(counted)
+    columns = dict(zip(Counts._fields, zip(*counted, strict=True), strict=True))
+    found = Counts(**{k: _EXTREMES.get(k, np.sum)(of, axis=0) for k, of in columns.items()})
     ticks = max(int(found.ticks.sum()), 1)
     squares = found.error_square / np.maximum(found.ticks, 1)[:, None]
     (stance, flight), most = np.sqrt(squares).tolist(), found.error[0].tolist()
