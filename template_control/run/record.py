@@ -6,10 +6,9 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 
@@ -23,8 +22,6 @@ from template_control.run import tables
 from template_control.run.facts import METADATA, Facts
 from template_control.run.tables import Quantity, quantities
 from template_control.slip.automaton.vocabulary import Phase
-
-R = TypeVar("R", bound="Record")
 
 
 @dataclass(frozen=True, repr=False)
@@ -207,7 +204,8 @@ class Record(Facts):
         Raises:
             RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
         """
-        kind = next((k for k in _kinds(cls) if _holds(path, k)), cls)
+        special = (k for k in (SoleRecord, FloatingRecord) if issubclass(k, cls))
+        kind: Any = next((k for k in special if _holds(path, k)), cls)
         layout = {name: quantity.layout for name, quantity in quantities(kind).items()}
         return storage.load(kind, path, kind.file_format, layout, METADATA)
 
@@ -321,13 +319,6 @@ class SoleRecord(FloatingRecord):
         least = 0.01 * float(self.metadata["mass"]) * 9.81
         load = np.where(fz > least, fz, np.nan)[:, :, None]
         return self.sole_wrench[:, :, [4, 3]] * (-1.0, 1.0) / load
-
-
-def _kinds(kind: type[R]) -> Iterator[type[R]]:
-    """All kinds of runs that are of a kind, the most special first."""
-    for special in kind.__subclasses__():
-        yield from _kinds(special)
-    yield kind
 
 
 def _holds(path: str | Path, kind: type[Record]) -> bool:
