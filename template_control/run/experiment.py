@@ -70,7 +70,6 @@ STEPS = 50  # steps of a run on a route that does not end, where the experiment 
 
 _STAND = 2.0  # a walk's first and last stand [s]
 _LONGEST_DELAY = 1.0  # [s]
-_SPECS = (LqrOptions, AheadOptions, ModifiedOptions, RunningOptions, OwnPlanner)
 
 
 @dataclass(frozen=True)
@@ -193,7 +192,7 @@ class Experiment(Checked):
     def resolved(self) -> Experiment:
         """The same experiment with the motion, planner and tuning used where none was given."""
         motion, planner = self.motion, self.planner
-        if motion is None and (planner is None or isinstance(planner, _SPECS)):
+        if motion is None and (planner is None or isinstance(planner, PlannerSpec)):
             motion = GaitSpec()
         if planner is None and not isinstance(motion, Route | VelocityProfile | VelocityCommand):
             planner = self._default_planner(motion)
@@ -278,17 +277,16 @@ class Experiment(Checked):
             start = e.start if e.seed is None else perturbed_start(found, e.seed)
         if e.strict:
             _check_strictly(found, planner)
-        same = {f.name: getattr(e, f.name) for f in fields(e)}
+        given = {f.name: getattr(e, f.name) for f in fields(e)}
         new = {"robot": robot, "motion": found, "planner": planner, "start": start, "steps": steps}
-        profile = e.motion if isinstance(e.motion, VelocityProfile) else None
-        changes = None if profile is None or profile.foreseen else profile
+        changes = None if velocity is None or velocity is e.motion else e.motion
         rest = {"seed": None, "strict": False, "velocity": velocity, "changes": changes}
-        return PreparedExperiment(**{**same, **new, **rest})
+        return PreparedExperiment(**given | new | rest)
 
     def _kept(self, motion: Gait | None, robot: Biped) -> tuple[Gait, Planner]:
         """The gait that is kept, and its planner."""
         planner = self.planner
-        if isinstance(planner, _SPECS):
+        if isinstance(planner, PlannerSpec):
             assert motion is not None
             made = _planner(planner, motion, robot)
             return made.gait if isinstance(made, AheadPlanner) else motion, made
@@ -314,7 +312,7 @@ class Experiment(Checked):
         if isinstance(planner, AheadOptions):
             speed, limits = first_speed(motion), walk_limits(robot)
             planner = AheadPlanner(motion.parameters, planner, speed, limits=limits)
-        elif isinstance(planner, _SPECS):
+        elif isinstance(planner, PlannerSpec):
             gait = walking_gait(motion.parameters, first_speed(motion))
             planner = _planner(planner, gait, robot)
         return motion, default_planners(motion, planner, standing=standing_options(robot))
