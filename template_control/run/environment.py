@@ -129,9 +129,9 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._run = run = LiveRun(self._commanded(self._wanted[0]), keep=_KEPT)
         self._tick = next(run)
         self._scale = Scale.of(run.controller.parameters)
-        self._place = self._where()
+        self._place = self._where(run)
         self._walked = self._wanted[0], 0.0
-        return self._observation(), self._info()
+        return self._observation(run), self._info(run)
 
     def step(
         self, action: NDArray[np.float32]
@@ -160,7 +160,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             self._tick = tick
             if tick.steps > before.steps:
                 break
-        place, duration = self._where(), max(self._tick.time - before.time, 1e-3)
+        place, duration = self._where(run), max(self._tick.time - before.time, 1e-3)
         x, y, heading = place - self._place
         ahead = np.cos(self._place[2]) * x + np.sin(self._place[2]) * y
         self._place, self._walked = place, (float(ahead) / duration, float(heading) / duration)
@@ -168,7 +168,7 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         reward = -_FALL if fell else 1.0 - _OFF * self._error()
         truncated = not fell and self._tick.steps >= self._strides
         self._over = fell or truncated
-        return self._observation(), reward, fell, truncated, self._info()
+        return self._observation(run), reward, fell, truncated, self._info(run)
 
     def close(self) -> None:
         """End the episode's run."""
@@ -208,10 +208,9 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
             size, side = float(draw.uniform(-1.0, 1.0)), float(draw.uniform(-np.pi, np.pi))
             run.hand.push(self._impulse * size, direction=side if self._free else 0.0)
 
-    def _where(self) -> Array:
+    def _where(self, run: LiveRun) -> Array:
         """x and y of the CoM [m], and the heading [rad]."""
-        assert self._run is not None
-        last = self._run.recorder.latest(1)
+        last = run.recorder.latest(1)
         com = last["space_com"][0, :2] if self._free else (last["com"][0, 0], 0.0)
         return np.array([*com, last["heading"][0]])
 
@@ -220,10 +219,9 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         time = self._scale.time
         return abs(speed - wanted) / self._scale.speed + abs(rate - turning) * time
 
-    def _observation(self) -> NDArray[np.float32]:
-        assert self._run is not None
-        scale, last = self._scale, self._run.recorder.latest(1)
-        speed, height, climb = self._run.controller.reports[-1].state
+    def _observation(self, run: LiveRun) -> NDArray[np.float32]:
+        scale, last = self._scale, run.recorder.latest(1)
+        speed, height, climb = run.controller.reports[-1].state
         pitch = last["attitude"][0, 1] if self._free else last["q"][0, 2]
         values = [speed / scale.speed, height / scale.length, climb / scale.speed, pitch]
         values += [self._walked[0] / scale.speed, self._wanted[0] / scale.speed]
@@ -234,6 +232,5 @@ class WalkEnv(gymnasium.Env[NDArray[np.float32], NDArray[np.float32]]):
         values += self._action.tolist()
         return np.clip(np.array(values, dtype=np.float32), -_MOST, _MOST)
 
-    def _info(self) -> dict[str, Any]:
-        assert self._run is not None
-        return {"time": self._tick.time, "fall_reason": self._run.reason}
+    def _info(self, run: LiveRun) -> dict[str, Any]:
+        return {"time": self._tick.time, "fall_reason": run.reason}
