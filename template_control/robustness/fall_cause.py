@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from template_control.arrays import Array, BoolArray
+from template_control.arrays import BoolArray, IntArray
 from template_control.run.record import FloatingRecord, Record
 from template_control.slip.similarity import Scale
 
@@ -47,20 +47,18 @@ def _bears(record: Record) -> BoolArray:
 
 def _limited(record: Record) -> BoolArray:
     at_limit = np.abs(record.torque) >= _LIMIT * record.torque_limit
-    long, time = _AT_LIMIT * Scale.of(record.template).time, record.time
-    lasts = [np.where(on, time - _at_begin(time, on), 0.0) for on in at_limit.T]
-    return np.asarray(np.max(lasts, axis=0) >= long)
+    lasts = record.time[:, None] - record.time[_began(at_limit)]
+    long = lasts >= _AT_LIMIT * Scale.of(record.template).time
+    return np.asarray((at_limit & long).any(axis=1))
 
 
 def _slipped(record: Record) -> BoolArray:
-    wrong = np.zeros(len(record.time), dtype=bool)
-    places = record.foot[..., :1]
+    bears, places = _bears(record), record.foot[..., :1]
     if isinstance(record, FloatingRecord):
         places = record.space_foot[..., :2]
-    for place, bears in zip(places.swapaxes(0, 1), _bears(record).T, strict=True):
-        slid = np.linalg.norm(place - _at_begin(place, bears), axis=1)
-        wrong |= bears & (slid > _SLIP * record.template.rest_length)
-    return wrong
+    begun = np.take_along_axis(places, _began(bears)[..., None], axis=0)
+    slid = np.linalg.norm(places - begun, axis=2)
+    return np.asarray((bears & (slid > _SLIP * record.template.rest_length)).any(axis=1))
 
 
 def _stumbled(record: Record) -> BoolArray:
@@ -87,11 +85,11 @@ def _late(record: Record) -> BoolArray:
     return np.asarray(waited > _LATE * usual)
 
 
-def _at_begin(value: Array, true: BoolArray) -> Array:
-    """(T,) the value where the present stretch of ``true`` began; undefined outside of it."""
-    begins = true & ~np.concatenate(([False], true[:-1]))
-    last = np.maximum.accumulate(np.where(begins, np.arange(len(true)), 0))
-    return np.asarray(value[last])
+def _began(true: BoolArray) -> IntArray:
+    """(T, n) sample where the present stretch of each ``true`` began; undefined outside of it."""
+    begins = np.diff(true, axis=0, prepend=False) & true
+    samples = np.arange(len(true))[:, None]
+    return np.maximum.accumulate(np.where(begins, samples, 0), axis=0)
 
 
 _LOOKS: dict[str, Callable[[Record], BoolArray]] = {
