@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import takewhile
 
 from scipy.stats import binomtest
 
@@ -89,17 +90,17 @@ class Finding:
     @property
     def breaking_point(self) -> float | None:
         """The severest level up to which every trial of each level succeeds, or None."""
-        return _last(self.levels, [level.rate >= 1.0 for level in self.levels])
+        return self._last(lambda level: level.rate >= 1.0)
 
     @property
     def half_point(self) -> float | None:
         """The severest level up to which at least half of each level's trials succeed, or None."""
-        return _last(self.levels, [level.rate >= _HALF for level in self.levels])
+        return self._last(lambda level: level.rate >= _HALF)
 
     @property
     def standing_point(self) -> float | None:
         """The severest level up to which no trial falls, or None."""
-        return _last(self.levels, [level.fell == 0 for level in self.levels])
+        return self._last(lambda level: level.fell == 0)
 
     @property
     def broken(self) -> bool:
@@ -111,11 +112,10 @@ class Finding:
         twice = len(rates) > 1 and max(rates[-2:]) < _HALF
         return bool(rates) and (rates[-1] == 0.0 or twice)
 
-
-def _last(levels: Sequence[Level], good: Sequence[bool]) -> float | None:
-    """The level before the first that is not good; None where that is the first."""
-    count = next((i for i, fine in enumerate(good) if not fine), len(good))
-    return levels[count - 1].level if count else None
+    def _last(self, good: Callable[[Level], bool]) -> float | None:
+        """The level before the first that is not good; None where that is the first."""
+        passed = list(takewhile(good, self.levels))
+        return passed[-1].level if passed else None
 
 
 @dataclass(frozen=True)
