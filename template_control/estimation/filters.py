@@ -50,19 +50,16 @@ class JointFilter:
 
     def update(self, measured: Array, acceleration: Array, dt: float) -> None:
         """Advance by dt [s] with angles (nu,) [rad] and expected accelerations (nu,) [rad/s^2]."""
-        alpha, beta = self._gains(dt)
+        o = self.options
+        index = o.acceleration_noise * dt**2 / o.angle_noise
+        r = 0.25 * (4.0 + index - np.sqrt(8.0 * index + index**2))
+        alpha = 1.0 - r**2
+        beta = 2.0 * (2.0 - alpha) - 4.0 * float(np.sqrt(1.0 - alpha))
         angle = self.angle + (self.speed + 0.5 * acceleration * dt) * dt
         speed = self.speed + acceleration * dt
         missed = measured - angle
         self.angle = angle + alpha * missed
         self.speed = speed + beta / dt * missed
-
-    def _gains(self, dt: float) -> tuple[float, float]:
-        o = self.options
-        index = o.acceleration_noise * dt**2 / o.angle_noise
-        r = 0.25 * (4.0 + index - np.sqrt(8.0 * index + index**2))
-        alpha = 1.0 - r**2
-        return alpha, 2.0 * (2.0 - alpha) - 4.0 * float(np.sqrt(1.0 - alpha))
 
 
 @dataclass(frozen=True)
@@ -141,13 +138,10 @@ class NoiseFilter:
         q = robot.moved(q, (v + 0.5 * acceleration * dt) * dt)
         v = v + acceleration * dt
         errors = np.array([robot.between(q, measured[0]), measured[1] - v])
-        rough = self._landed <= o.settling
-        joints = o.landing_noise if rough else o.acceleration_noise
-        change = np.empty_like(errors)
-        change[:, :FLOATING_DOF] = (
-            self._base.gain(o.acceleration_noise, dt) @ errors[:, :FLOATING_DOF]
-        )
-        change[:, FLOATING_DOF:] = self._joints.gain(joints, dt) @ errors[:, FLOATING_DOF:]
+        lacking = o.landing_noise if self._landed <= o.settling else o.acceleration_noise
+        base = self._base.gain(o.acceleration_noise, dt) @ errors[:, :FLOATING_DOF]
+        joints = self._joints.gain(lacking, dt) @ errors[:, FLOATING_DOF:]
+        change = np.hstack((base, joints))
         self._state = robot.moved(q, change[0]), v + change[1]
         return self._state
 
