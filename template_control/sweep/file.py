@@ -12,12 +12,10 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple, NoReturn, TypeVar
+from typing import Any, BinaryIO, NamedTuple, NoReturn
 
 from template_control.errors import SweepError
 from template_control.storage import free_lock, take_lock, to_jsonable
-
-T = TypeVar("T")
 
 _FORMAT = "template-control sweep 1"
 
@@ -44,14 +42,6 @@ def name_of(function: Callable[..., Any]) -> str:
     return f"{kind.__module__}.{kind.__qualname__}"
 
 
-def _written(what: str, make: Callable[[], T]) -> T:
-    """What ``make`` returns; a SweepError if that, which is ``what``, is no plain data."""
-    try:
-        return make()
-    except TypeError as error:
-        raise SweepError(f"{what} cannot be written to a file: {error}") from None
-
-
 class SweepFile:
     """A results file, open and locked for this process; a context manager.
 
@@ -68,12 +58,15 @@ class SweepFile:
         seed: int,
     ) -> None:
         self.path = Path(path)
-        name = _written("the function", lambda: name_of(function))
-        self._head = {"format": _FORMAT, "function": name, "seed": seed}
-        self._items = [
-            _written(f"item {i}", lambda item=item: to_jsonable(item))  # type: ignore[misc]
-            for i, item in enumerate(items)
-        ]
+        self._items: list[Any] = []
+        what = "the function"
+        try:
+            self._head = {"format": _FORMAT, "function": name_of(function), "seed": seed}
+            for i, item in enumerate(items):
+                what = f"item {i}"
+                self._items.append(to_jsonable(item))
+        except TypeError as error:
+            raise SweepError(f"{what} cannot be written to a file: {error}") from None
         self.finished: dict[int, Outcome] = {}
         if self.path.exists() and not self.path.is_file():
             self._refuse("is no file")
