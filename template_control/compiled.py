@@ -66,8 +66,7 @@ def _digest() -> str:
     They are the modules with compiled functions, and what they import, whose constants are frozen
     into the code.
     """
-    names = {path: _module(path) for path in sorted(_PACKAGE.rglob("*.py"))}
-    contents = {name: path.read_bytes() for path, name in names.items()}
+    contents = {_module(path): path.read_bytes() for path in _PACKAGE.rglob("*.py")}
     found: set[str] = set()
     waiting = [n for n, text in contents.items() if __name__ in _imported(text)]
     while waiting:
