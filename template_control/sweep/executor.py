@@ -9,7 +9,7 @@ import signal
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, nullcontext
 from itertools import islice
@@ -82,11 +82,12 @@ def run_calls(
                     continue
                 keep(under_way[future], _outcome(future))
                 del under_way[future]
-        except SweepError:
-            _cancel(under_way, pool)
-            raise
-        except BaseException:
-            _cancel(under_way, pool)
+        except BaseException as error:
+            if not isinstance(pool, _Workers):
+                for future in under_way:
+                    future.cancel()
+            if isinstance(error, SweepError):
+                raise
             # Our own processes are ended next: what needs little more time gets it.
             running = [future for future in under_way if future.running()]
             wait(running, _GRACE if executor is None else 0.0)
@@ -135,14 +136,10 @@ def _outcome(future: Future[Outcome]) -> Outcome:
 
 
 class _Workers(ProcessPoolExecutor):
-    """Process pool of :func:`workers`, a type of its own: its pending calls are cancelled."""
+    """Process pool of :func:`workers`, which cancels its pending calls as it ends.
 
-
-def _cancel(under_way: Iterable[Future[Outcome]], pool: Executor) -> None:
-    """Cancel the calls that have not started; our own workers fail if one dies meanwhile."""
-    if not isinstance(pool, _Workers):
-        for future in under_way:
-            future.cancel()
+    To cancel them one by one makes it fail if a process dies meanwhile.
+    """
 
 
 @contextmanager
