@@ -21,7 +21,7 @@ from template_control.arrays import Array, IntArray
 from template_control.plant.terrain import Terrain
 from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import spring
-from template_control.view.replay.robot_visuals import foot_sides, load_visuals
+from template_control.view.replay.robot_visuals import foot_sides, load_shapes, triangles
 from template_control.view.replay.scene import (
     Space,
     in_space,
@@ -96,7 +96,7 @@ class LiveScene:
         scene.reset()
         scene.set_up_direction("+z")
         scene.configure_default_lights(cast_shadow=False)
-        model, shapes, visuals = load_visuals(record)
+        model, shapes = load_shapes(record)
         self._sides = foot_sides(model, record.feet)
         self._scene, self._terrain, self._record = scene, ground, record
         self._model, self._data = model, model.createData()
@@ -108,7 +108,7 @@ class LiveScene:
         self._world = scene.add_frame("/world", show_axes=False)
         self._place: tuple[float, float] | None = None  # middle of the ground that is drawn
         hip = model.getJointId(record.joints[record.legs[0][0]])
-        self.joints = self._add_robot(shapes, visuals, trunk=model.parents[hip])
+        self.joints = self._add_robot(shapes, trunk=model.parents[hip])
         self._com = self._ball("com", 0.025, COM)
         self._template = self._ball("template", 0.016, TEMPLATE)
         self._legs = [self._add_leg(name) for name in ("rear_leg", "front_leg")]
@@ -122,6 +122,7 @@ class LiveScene:
             "/world/trail", np.zeros((1, 2, 3)), _rgb(COM), thickness=0.008 * length
         )
         self._frames = 0
+        self.clear()
 
     def look(self, camera: Any) -> None:
         """Put a camera where the robot is seen from the side; from ahead too if it may turn."""
@@ -129,17 +130,17 @@ class LiveScene:
         camera.position = tuple(self._size * x for x in eye)
         camera.look_at, camera.fov = (0.0, 0.0, 0.0), _VIEW
 
-    def _add_robot(self, shapes: pin.GeometryModel, visuals: Any, trunk: int) -> list[_Joint]:
+    def _add_robot(self, shapes: pin.GeometryModel, trunk: int) -> list[_Joint]:
         """Nodes of the robot's joints, each below that of its parent, and their shapes."""
         model, scene = self._model, self._scene
         paths = ["/world/robot"]
         for joint in range(1, model.njoints):
             paths.append(f"{paths[model.parents[joint]]}/{joint}")
         nodes = [_Joint(scene.add_frame(path, show_axes=False)) for path in paths[1:]]
-        for shape, visual in zip(shapes.geometryObjects, visuals, strict=True):
+        for shape in shapes.geometryObjects:
             joint = shape.parentJoint
             place = pin.SE3ToXYZQUAT(shape.placement)
-            *color, opacity = visual.color
+            *color, opacity = shape.meshColor.tolist()
             look = {
                 "color": tuple(round(255 * _SHADE * part) for part in color),
                 # With an opacity, be it 1, the page sorts shapes by their centres only.
@@ -149,7 +150,7 @@ class LiveScene:
                 "wxyz": place[[6, 3, 4, 5]],
                 "cast_shadow": False,
             }
-            self._add_shape(f"{paths[joint]}/{visual.name}", shape.geometry, look)
+            self._add_shape(f"{paths[joint]}/{shape.name}", shape.geometry, look)
         return nodes
 
     def _add_shape(self, path: str, shape: Any, look: dict[str, Any]) -> None:
@@ -162,10 +163,7 @@ class LiveScene:
             height = float(2.0 * shape.halfLength)
             scene.add_cylinder(path, float(shape.radius), height, radial_segments=20, **look)
         else:
-            faces = (shape.tri_indices(i) for i in range(shape.num_tris))
-            triangles = np.array([(t[0], t[1], t[2]) for t in faces])
-            vertices = np.array(shape.vertices())
-            scene.add_mesh_simple(path, vertices, triangles, side="double", **look)
+            scene.add_mesh_simple(path, *triangles(shape), side="double", **look)
 
     def _ball(self, name: str, radius: float, color: str) -> Any:
         size = radius * self._length
@@ -179,24 +177,22 @@ class LiveScene:
         )
         return _Span(node, grows=False)
 
-    def _add_arrow(self, name: str, color: str) -> _Span:
-        vertices, faces = _arrow()
-        node = self._scene.add_mesh_simple(
-            f"/world/{name}", vertices, faces, color=_rgb(color), side="double", cast_shadow=False
+    def _mesh(self, name: str, surface: tuple[Array, IntArray], color: str) -> Any:
+        """A node of vertices and faces."""
+        return self._scene.add_mesh_simple(
+            f"/world/{name}", *surface, color=_rgb(color), side="double", cast_shadow=False
         )
+
+    def _add_arrow(self, name: str, color: str) -> _Span:
+        node = self._mesh(name, _arrow(), color)
         node.visible = False
         return _Span(node, grows=True)
 
     def _add_holds(self, foot: int, color: str) -> deque[Any]:
         """Marks of the last footholds of a foot, the oldest first."""
-        vertices, faces = plates(np.zeros((1, 3)), (0.05 * self._length, 0.1 * self._length))
-        marks: deque[Any] = deque()
-        for i in range(_FOOTHOLDS):
-            path, how = f"/world/foothold_{foot}_{i}", {"side": "double", "cast_shadow": False}
-            mark = self._scene.add_mesh_simple(path, vertices, faces, color=_rgb(color), **how)
-            mark.visible = False
-            marks.append(mark)
-        return marks
+        plate = plates(np.zeros((1, 3)), (0.05 * self._length, 0.1 * self._length))
+        names = (f"foothold_{foot}_{i}" for i in range(_FOOTHOLDS))
+        return deque(self._mesh(name, plate, color) for name in names)
 
     def draw(self, columns: Mapping[str, Any], push: tuple[float, float] = (0.0, 0.0)) -> None:
         """Show the last of some ticks, with a push forward and to the left [N].
@@ -256,11 +252,9 @@ class LiveScene:
         self._place = x, y
         line = np.array(self._terrain.line(x - _SEEN * length, x + _SEEN * length))
         wide = _SEEN * length if self._floating else 1.5 * length
-        how = {"side": "double", "cast_shadow": False}
-        surface = strip(line, (y - wide, y + wide))
-        self._scene.add_mesh_simple("/world/ground", *surface, color=_rgb(_GROUND), **how)
+        self._mesh("ground", strip(line, (y - wide, y + wide)), _GROUND)
         lines = stripes(self._terrain, (line[0, 0], line[-1, 0]), (y, 2.0 * wide), length)
-        self._scene.add_mesh_simple("/world/stripes", *lines, color=_rgb(_LINES), **how)
+        self._mesh("stripes", lines, _LINES)
 
 
 def _spread(record: Record) -> float:
@@ -274,12 +268,11 @@ def _top(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> float:
     """Height of a robot's highest shape, taken for the ball around its box [m]."""
     data, places = model.createData(), shapes.createData()
     pin.updateGeometryPlacements(model, data, shapes, places, q)
-    tops = []
-    for shape, place in zip(shapes.geometryObjects, places.oMg, strict=True):
-        shape.geometry.computeLocalAABB()
-        ball = shape.geometry
-        tops.append(place.act(ball.aabb_center)[2] + ball.aabb_radius)
-    return float(max(tops))
+    balls = [shape.geometry for shape in shapes.geometryObjects]
+    for ball in balls:
+        ball.computeLocalAABB()
+    tops = zip(balls, places.oMg, strict=True)
+    return float(max(place.act(b.aabb_center)[2] + b.aabb_radius for b, place in tops))
 
 
 def _rgb(color: str) -> tuple[int, int, int]:

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
-from template_control.arrays import Array
+from template_control.arrays import Array, BoolArray, IntArray
 from template_control.errors import RecordError
 from template_control.run.record import FloatingRecord, Record
 from template_control.storage import atomic_path
@@ -50,15 +50,15 @@ FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # camera of a plan
 class Stage:
     """The picture of a run, whose artists each frame moves.
 
-    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of each, and
-    ``body`` has the places of joints and trunk in the frame that is shown.
+    ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of each, through
+    its ``joints`` (F, n, joints, 3) [m].
     """
 
     def __init__(self, playback: Playback) -> None:
         record = playback.record
         self.playback, self._space = playback, in_space(record, np.zeros(len(record.feet)))
         self._stood = stood(record, self._space)
-        self.body = _Body(record)
+        self.joints, self._corners, on_left = _bodies(record, playback.rows)
         self._length = length = record.template.rest_length
         flat = not isinstance(record, FloatingRecord)
         self.camera = FROM_THE_SIDE if flat else IN_SPACE
@@ -70,8 +70,7 @@ class Stage:
         axes.set_aspect("equal", adjustable="box")
         self._draw_ground(flat)
         self._level = smoothed(record.ground, self._space.com[playback.rows, 0], length)
-        self.body.place(record.q[playback.rows[0]])
-        tall = float(self.body.trunk()[:, 2].max() - self._level[0]) * self.camera[1, 2]
+        tall = float(self._corners[0, :, 2].max() - self._level[0]) * self.camera[1, 2]
         high = max(_FLATTER * _WIDTH * length, _OVER * tall / (1.0 - self._below))
         self._size = high / _FLATTER, high
 
@@ -85,7 +84,7 @@ class Stage:
         thick: dict[str, Any] = {"linewidth": 4, "solid_capstyle": "round"}
         self.legs = [
             line("", 2 if left else 4, color=c, **thick)
-            for (_, c), left in zip(shown, self.body.left, strict=True)
+            for (_, c), left in zip(shown, on_left, strict=True)
         ]
         width = 7 if flat else 3
         self._trunk = Polygon(
@@ -142,10 +141,9 @@ class Stage:
         record, space, rows = self.playback.record, self._space, self.playback.rows
         row, seen = rows[frame], self.seen
         com, feet = space.com[row], space.foot[row]
-        self.body.place(record.q[row])
-        self._trunk.set_xy(seen(self.body.trunk()))
+        self._trunk.set_xy(seen(self._corners[frame]))
         for foot, leg in enumerate(self.legs):
-            leg.set_data(*seen(np.vstack((self.body.leg(foot), feet[foot]))).T)
+            leg.set_data(*seen(np.vstack((self.joints[frame, foot], feet[foot]))).T)
             places, since = self._stood[foot]
             self._marks[foot].set_data(*seen(places[since <= record.time[row]]).T)
         template = seen(space.template[row])
@@ -165,40 +163,30 @@ class Stage:
         self._time.set_text(f"{record.time[row]:.2f} s")
 
 
-class _Body:
-    """Places of joints and trunk in a configuration, by Pinocchio."""
+def _bodies(record: Record, rows: IntArray) -> tuple[Array, Array, BoolArray]:
+    """The robot in samples ``rows`` (F,), by Pinocchio.
 
-    def __init__(self, record: Record) -> None:
-        self._model = model_of(record)
-        self._data = self._model.createData()
-        names = [[record.joints[i] for i in leg] for leg in record.legs]
-        self._joints = [[self._model.getJointId(name) for name in leg] for leg in names]
-        self._trunk = self._model.parents[self._joints[0][0]]
-        self._top = np.array([0.0, 0.0, 2.0 * record.trunk_com])
-        self.place(pin.neutral(self._model))
-        hips = self._hips()
-        self.left = (hips[:, 1] > hips[:, 1].mean()).tolist()
-        away = hips - hips.mean(axis=0)
-        self._around = np.argsort(np.arctan2(away[:, 1], away[:, 0]))
-
-    def place(self, q: Array) -> None:
-        pin.forwardKinematics(self._model, self._data, q)
-
-    def leg(self, foot: int) -> Array:
-        """(joints, 3) from the trunk on [m]."""
-        return np.array([self._data.oMi[joint].translation for joint in self._joints[foot]])
-
-    def _hips(self) -> Array:
-        return np.array([self.leg(foot)[0] for foot in range(len(self._joints))])
-
-    def trunk(self) -> Array:
-        """(4, 3) corners [m]: four hips, or those of two and twice as high as its CoM."""
-        hips = self._hips()
-        if len(hips) > len(SIDES):
-            return hips[self._around]
-        left, right = hips
-        up = self._data.oMi[self._trunk].rotation @ self._top
-        return np.array([left, right, right + up, left + up])
+    Returns:
+        (F, n, joints, 3) joints of each leg from the trunk on, (F, 4, 3) corners of the trunk [m]:
+        four hips, or those of two and twice as high as its CoM; (n,) whether a leg is a left one.
+    """
+    model = model_of(record)
+    data = model.createData()
+    joints = [[model.getJointId(record.joints[i]) for i in leg] for leg in record.legs]
+    trunk, top = model.parents[joints[0][0]], np.array([0.0, 0.0, 2.0 * record.trunk_com])
+    legs, up = [], []
+    for q in (pin.neutral(model), *record.q[rows]):
+        pin.forwardKinematics(model, data, q)
+        legs.append([[data.oMi[joint].translation.copy() for joint in leg] for leg in joints])
+        up.append(data.oMi[trunk].rotation @ top)
+    found = np.array(legs)
+    first, hips = found[0, :, 0], found[1:, :, 0]
+    if len(joints) > len(SIDES):
+        away = first - first.mean(axis=0)
+        corners = hips[:, np.argsort(np.arctan2(away[:, 1], away[:, 0]))]
+    else:
+        corners = np.concatenate((hips, hips[:, ::-1] + np.array(up[1:])[:, None]), axis=1)
+    return found[1:], corners, first[:, 1] > first[:, 1].mean()
 
 
 _DPI = 100

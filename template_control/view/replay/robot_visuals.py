@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,7 @@ import pinocchio as pin
 from matplotlib.colors import to_rgba
 from meshcat import geometry as mg
 
-from template_control.arrays import Array
+from template_control.arrays import Array, IntArray
 from template_control.errors import RecordError
 from template_control.robot.legs import foot_frame
 from template_control.run.record import FloatingRecord, Record
@@ -23,23 +22,11 @@ _STICK = 0.02  # radius of a stick over the template's rest length
 # meshcat's cylinders lie along y, the URDF's along z.
 _Y_TO_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
-
-@dataclass(frozen=True)
-class Visual:
-    """One shape of the robot for meshcat, at ``offset`` (4, 4) in the URDF's visual frame."""
-
-    name: str
-    geometry: mg.Geometry
-    offset: Array
-    color: tuple[float, float, float, float]
+_PRIMITIVES = ("Box", "Sphere", "Cylinder")
 
 
-Robot = tuple[pin.Model, pin.GeometryModel, list[Visual]]
-"""A robot's model, and its shapes in the geometry model's order."""
-
-
-def load_visuals(record: Record) -> Robot:
-    """The robot of a run, and its shapes in the geometry model's order.
+def load_shapes(record: Record) -> tuple[pin.Model, pin.GeometryModel]:
+    """The robot of a run, and its shapes.
 
     A mesh that is missing or cannot be read is left out. Legs and trunk that have no shape then are
     drawn as sticks.
@@ -51,16 +38,15 @@ def load_visuals(record: Record) -> Robot:
         )
     model = model_of(record)
     shapes = pin.buildGeomFromUrdfString(model, _with_meshes(text), pin.GeometryType.VISUAL)
-    visuals = [_visual(shape) for shape in shapes.geometryObjects]
-    for shape, visual in zip(list(shapes.geometryObjects), visuals, strict=True):
-        if visual is None:
+    for shape in list(shapes.geometryObjects):
+        geometry = shape.geometry
+        if not (type(geometry).__name__ in _PRIMITIVES or hasattr(geometry, "tri_indices")):
             shapes.removeGeometryObject(shape.name)
     seen = {shape.parentJoint for shape in shapes.geometryObjects}
     for stick in sticks(record, model):
         if stick.parentJoint not in seen:
             shapes.addGeometryObject(stick)
-            visuals.append(_visual(stick))
-    return model, shapes, [visual for visual in visuals if visual is not None]
+    return model, shapes
 
 
 def _with_meshes(text: str) -> str:
@@ -142,23 +128,19 @@ def foot_sides(model: pin.Model, feet: Sequence[str]) -> Array:
     return np.array([data.oMf[foot_frame(model, foot)].translation[1] for foot in feet])
 
 
-def _visual(shape: pin.GeometryObject) -> Visual | None:
-    """The shape for meshcat; None of a kind that it does not draw."""
-    geometry: Any = shape.geometry
-    offset = np.eye(4)
+def triangles(mesh: Any) -> tuple[Array, IntArray]:
+    """Vertices (N, 3) [m] and faces (M, 3) of a mesh."""
+    faces = (mesh.tri_indices(i) for i in range(mesh.num_tris))
+    return np.array(mesh.vertices()), np.array([(t[0], t[1], t[2]) for t in faces])
+
+
+def drawn(geometry: Any) -> tuple[mg.Geometry, Array]:
+    """What meshcat draws of a shape's geometry, and where that is in the shape's frame (4, 4)."""
     kind = type(geometry).__name__
     if kind == "Box":
-        drawn = mg.Box([float(2.0 * side) for side in geometry.halfSide])
-    elif kind == "Sphere":
-        drawn = mg.Sphere(float(geometry.radius))
-    elif kind == "Cylinder":
-        drawn = mg.Cylinder(float(2.0 * geometry.halfLength), float(geometry.radius))
-        offset = _Y_TO_Z
-    elif hasattr(geometry, "tri_indices"):
-        triangles = (geometry.tri_indices(i) for i in range(geometry.num_tris))
-        faces = [(t[0], t[1], t[2]) for t in triangles]
-        drawn = mg.TriangularMeshGeometry(np.array(geometry.vertices()), np.array(faces))
-    else:
-        return None
-    red, green, blue, opacity = (float(c) for c in shape.meshColor)
-    return Visual(shape.name, drawn, offset, (red, green, blue, opacity))
+        return mg.Box([float(2.0 * side) for side in geometry.halfSide]), np.eye(4)
+    if kind == "Sphere":
+        return mg.Sphere(float(geometry.radius)), np.eye(4)
+    if kind == "Cylinder":
+        return mg.Cylinder(float(2.0 * geometry.halfLength), float(geometry.radius)), _Y_TO_Z
+    return mg.TriangularMeshGeometry(*triangles(geometry)), np.eye(4)

@@ -11,11 +11,9 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 import umsgpack
 from meshcat import geometry as mg
-from meshcat.animation import Animation, AnimationClip
-from meshcat.commands import SetAnimation, SetObject, SetProperty, SetTransform
-from meshcat.path import Path as ScenePath
 
 from template_control.arrays import Array, BoolArray, IntArray
 from template_control.plant.terrain import Terrain
@@ -27,7 +25,7 @@ from template_control.view.replay.playback import (
     spring,
     stances,
 )
-from template_control.view.replay.robot_visuals import Robot, foot_sides, load_visuals, placements
+from template_control.view.replay.robot_visuals import drawn, foot_sides, load_shapes, placements
 from template_control.view.style import COM, TEMPLATE, feet_shown
 
 _AROUND = 11  # places that a height is the mean of
@@ -181,52 +179,43 @@ class _Dashed(mg.GenericMaterial):
     _type = "LineDashedMaterial"
 
 
-class _Track:
-    """Keyframes of one property as packed arrays, a tenth of meshcat's own in size."""
-
-    def __init__(self, name: str, kind: str, times: Array, values: Any) -> None:
-        self.name, self.kind, self.times, self.values = name, kind, times, values
-
-    def lower(self) -> dict[str, Any]:
-        packed = self.values
-        if not isinstance(packed, list):
-            packed = umsgpack.Ext(_FLOAT32, np.asarray(packed, np.float32).tobytes())
-        times = umsgpack.Ext(_FLOAT32, np.asarray(self.times, np.float32).tobytes())
-        return {"name": "." + self.name, "type": self.kind, "times": times, "values": packed}
-
-
-class _LastAnimation(SetAnimation):
-    """Filed under a path of its own: the server sends late browsers the root's first of all."""
-
-    def lower(self) -> dict[str, Any]:
-        return {**super().lower(), "path": "/animation"}
+def _packed(numbers: Array) -> umsgpack.Ext:
+    """Numbers for the viewer, a tenth of meshcat's own in size."""
+    return umsgpack.Ext(_FLOAT32, np.asarray(numbers, np.float32).tobytes())
 
 
 class _Scene:
-    """Collects commands, and one clip an animated path; all clips last as long as the clock."""
+    """Collects commands, and tracks of keyframes by path; all last as long as the clock."""
 
     def __init__(self, clock: Array) -> None:
         self.clock = clock
-        self.commands: list[Any] = []
-        self._animation = Animation()
+        self._commands: list[dict[str, Any]] = []
+        self._tracks: dict[str, list[dict[str, Any]]] = {}
+
+    def _command(self, kind: str, path: str, **what: Any) -> None:
+        self._commands.append({"type": kind, "path": path, **what})
 
     def add(self, path: str, geometry: mg.Geometry, material: mg.Material) -> None:
-        self.commands.append(SetObject(geometry, material, ScenePath().append(path)))
+        self._command("set_object", path, object=mg.Mesh(geometry, material).lower())
 
     def place(self, path: str, matrix: Array) -> None:
-        self.commands.append(SetTransform(np.asarray(matrix, float), ScenePath().append(path)))
+        self._command("set_transform", path, matrix=matrix.T.ravel().tolist())
 
     def set(self, path: str, name: str, value: Any) -> None:
-        self.commands.append(SetProperty(name, value, ScenePath().append(path)))
+        self._command("set_property", path, property=name, value=value)
 
-    def animate(self, path: str, name: str, kind: str, values: Any) -> None:
-        self._track(path, _Track(name, kind, self.clock, values))
+    def animate(self, path: str, name: str, kind: str, values: Array) -> None:
+        self._track(path, name, kind, self.clock, _packed(values))
 
     def show(self, path: str, visible: BoolArray) -> None:
         """Keys only where it changes, and at both ends: a switch is not interpolated."""
         keys = np.flatnonzero(np.diff(visible, prepend=~visible[:1]))
         keys = np.unique(np.append(keys, len(visible) - 1))
-        self._track(path, _Track("visible", "bool", self.clock[keys], visible[keys].tolist()))
+        self._track(path, "visible", "bool", self.clock[keys], visible[keys].tolist())
+
+    def _track(self, path: str, name: str, kind: str, times: Array, values: Any) -> None:
+        track = {"name": f".{name}", "type": kind, "times": _packed(times), "values": values}
+        self._tracks.setdefault(path, []).append(track)
 
     def stretch(self, path: str, begin: Array, span: Array, visible: BoolArray) -> None:
         """Let what stands from 0 to 1 on the vertical reach along ``span`` from ``begin``."""
@@ -243,24 +232,24 @@ class _Scene:
         self.add(path, mesh, _Dashed(_rgb(color), **dash, **properties))
         self.animate(f"{path}/<object>", "material.dashSize", "number", frames)
 
-    def _track(self, path: str, track: _Track) -> None:
-        # One frame a second: the tracks carry seconds.
-        clips = self._animation.clips
-        clip = clips.setdefault(ScenePath().append(path), AnimationClip(fps=1))
-        clip.tracks[track.name] = track
+    def finished(self) -> list[dict[str, Any]]:
+        """All commands; the tracks are of one clip a path, with a frame a second."""
+        clips = [
+            {"path": path, "clip": {"fps": 1, "name": "default", "tracks": tracks}}
+            for path, tracks in self._tracks.items()
+        ]
+        options = {"play": True, "repetitions": _FOREVER}
+        return [*self._commands, {"type": "set_animation", "animations": clips, "options": options}]
 
-    def finished(self) -> list[Any]:
-        return [*self.commands, _LastAnimation(self._animation, True, _FOREVER)]
 
-
-def scene_commands(playback: Playback) -> list[Any]:
-    """Commands that build and animate the scene; each has meshcat's ``lower()``."""
+def scene_commands(playback: Playback) -> list[dict[str, Any]]:
+    """Commands that build and animate the scene, as meshcat's viewer takes them."""
     scene, record = _Scene(playback.clock), playback.record
     length = float(record.template.rest_length)
-    robot = load_visuals(record)
-    space = in_space(record, foot_sides(robot[0], record.feet))
+    model, shapes = load_shapes(record)
+    space = in_space(record, foot_sides(model, record.feet))
     _surroundings(scene, playback, space, length)
-    _robot(scene, playback, robot)
+    _robot(scene, playback, model, shapes)
     _trail(scene, playback, space, length)
     _template(scene, playback, space, length)
     _forces(scene, playback, space, length)
@@ -314,16 +303,16 @@ def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float
     scene.set("/Cameras/default/rotated/<object>", "zoom", 2.4)
 
 
-def _robot(scene: _Scene, playback: Playback, robot: Robot) -> None:
-    model, shapes, visuals = robot
+def _robot(scene: _Scene, playback: Playback, model: pin.Model, shapes: pin.GeometryModel) -> None:
     positions, quaternions = placements(model, shapes, playback.record.q[playback.rows])
-    for i, visual in enumerate(visuals):
-        path = f"/meshcat/robot/{visual.name}"
-        red, green, blue, opacity = visual.color
-        color = sum(round(255 * c) << s for c, s in ((red, 16), (green, 8), (blue, 0)))
+    for i, shape in enumerate(shapes.geometryObjects):
+        path = f"/meshcat/robot/{shape.name}"
+        geometry, place = drawn(shape.geometry)
+        *rgb, opacity = shape.meshColor.tolist()
+        color = sum(round(255 * part) << bits for part, bits in zip(rgb, (16, 8, 0), strict=True))
         material = mg.MeshPhongMaterial(color=color, opacity=opacity, flatShading=True)
-        scene.add(f"{path}/shape", visual.geometry, material)
-        scene.place(f"{path}/shape", visual.offset)
+        scene.add(f"{path}/shape", geometry, material)
+        scene.place(f"{path}/shape", place)
         scene.animate(path, "position", "vector3", positions[:, i])
         scene.animate(path, "quaternion", "quaternion", quaternions[:, i])
 

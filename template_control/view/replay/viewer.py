@@ -72,7 +72,7 @@ def page_of(title: str, commands: list[Any], legs: Sequence[tuple[str, str]]) ->
     """Meshcat's viewer as one HTML page, with commands, and legs by name and colour."""
     feet = [(color, f"{name}: ground force, footholds") for name, color in legs]
     signs = (f'<b style="color: {c}">&#9632;</b> {text}' for c, text in (*_LEGEND, *feet))
-    packed = (base64.b64encode(umsgpack.packb(c.lower())).decode() for c in commands)
+    packed = (base64.b64encode(umsgpack.packb(c)).decode() for c in commands)
     return _PAGE.substitute(
         title=html.escape(title),
         legend="<br>".join(signs),

@@ -13,7 +13,7 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.view.replay.film import IN_SPACE, Stage
 from template_control.view.replay.playback import playback
-from template_control.view.replay.robot_visuals import load_visuals, placements
+from template_control.view.replay.robot_visuals import load_shapes, placements
 from template_control.view.replay.scene import in_space, scene_commands, stood, turned_to
 
 RADIUS = 0.01  # of the feet
@@ -68,10 +68,10 @@ def test_the_template_is_where_its_toes_are(record):
 
 @pytest.mark.slow(seconds=1)
 def test_visuals_are_where_the_run_recorded_the_feet(record):
-    model, shapes, visuals = load_visuals(record)
+    model, shapes = load_shapes(record)
     rows = np.arange(0, len(record.time), 97)
     position, _ = placements(model, shapes, record.q[rows])
-    names = [visual.name for visual in visuals]
+    names = [shape.name for shape in shapes.geometryObjects]
     for foot, side in enumerate(("left", "right")):
         found = position[:, names.index(f"{side}_foot_0")]
         np.testing.assert_allclose(found, record.space_foot[rows, foot] + [0, 0, RADIUS], atol=1e-9)
@@ -82,7 +82,7 @@ def test_the_scene_follows_the_walk_in_its_turn(record):
     frames = playback(record, fps=20.0)
     tracks = {
         (animation["path"], track["name"]): track["values"]
-        for animation in scene_commands(frames)[-1].lower()["animations"]
+        for animation in scene_commands(frames)[-1]["animations"]
         for track in animation["clip"]["tracks"]
     }
 
@@ -108,7 +108,7 @@ def test_the_film_shows_the_legs_on_their_feet(record):
             np.testing.assert_allclose(
                 points[-1], stage.seen(record.space_foot[row, foot]), atol=1e-12
             )
-        body = stage.body.leg(0)
+        body = stage.joints[frame, 0]
         thigh.append(np.linalg.norm(body[2] - body[1]))
     np.testing.assert_allclose(thigh, 0.45, atol=1e-9)
 
@@ -128,14 +128,14 @@ def test_the_command_replays_a_free_run(record, tmp_path, capfd):
 def test_a_robot_without_shapes_is_shown_with_sticks_down_to_its_feet(record):
     text = re.sub(r"<visual.*?</visual>", "", record.urdf, flags=re.DOTALL)
     bare = replace(record, metadata={**record.metadata, "urdf": text})
-    model, shapes, visuals = load_visuals(bare)
+    model, shapes = load_shapes(bare)
     rows = np.arange(0, len(record.time), 97)
     position, quaternion = placements(model, shapes, record.q[rows])
-    names = [visual.name for visual in visuals]
+    names = [shape.name for shape in shapes.geometryObjects]
     assert all(name.startswith("stick_") for name in names)
     for foot, leg in enumerate(record.legs):
         i = names.index(f"stick_{record.joints[leg[-1]]}")
-        half = 0.5 * visuals[i].geometry.height
+        half = shapes.geometryObjects[i].geometry.halfLength
         turned = Rotation.from_quat(quaternion[:, i]).apply([0.0, 0.0, half])
         away = np.minimum(
             *(

@@ -18,7 +18,7 @@ from template_control.view.live.pace import Pace
 from template_control.view.live.page import Figures, Step, first_push
 from template_control.view.live.scene import LiveScene
 from template_control.view.live.server import PageServer, is_own
-from template_control.view.replay.robot_visuals import foot_sides, load_visuals, model_of
+from template_control.view.replay.robot_visuals import foot_sides, load_shapes, model_of
 from template_control.view.replay.scene import in_space
 
 # Clock.
@@ -103,7 +103,7 @@ def test_joints_are_drawn_where_they_are_and_what_stands_still_is_not_sent_again
         to = [{k: v[: i + 1] for k, v in latest.items()} for i in (20, 149)]
         for columns in to:
             scene.draw(columns)
-        model, _, _ = load_visuals(record)
+        model, _ = load_shapes(record)
         data = model.createData()
         pin.forwardKinematics(model, data, to[-1]["q"][-1])
         places = {0: pin.SE3.Identity()}

@@ -14,7 +14,7 @@ from template_control.view.replay.playback import (
     playback,
     spring,
 )
-from template_control.view.replay.robot_visuals import load_visuals, placements
+from template_control.view.replay.robot_visuals import drawn, load_shapes, placements
 from template_control.view.replay.scene import in_space, scene_commands, stood
 
 FOOT_RADIUS = 0.01
@@ -77,11 +77,11 @@ def test_numbers_out_of_range_are_named(record, arguments, culprit):
 
 
 def test_visuals_are_where_the_run_recorded_joints_and_feet(record):
-    model, shapes, visuals = load_visuals(record)
+    model, shapes = load_shapes(record)
     rows = np.arange(0, len(record.time), 37)
     position, quaternion = placements(model, shapes, record.q[rows])
     assert np.allclose(np.linalg.norm(quaternion, axis=2), 1.0)
-    names = [visual.name for visual in visuals]
+    names = [shape.name for shape in shapes.geometryObjects]
     for foot, side in enumerate(("left", "right")):
         hip, knee = record.joint[rows][:, record.legs[foot]].transpose(1, 0, 2)
         sole = record.foot[rows, foot] + [0.0, FOOT_RADIUS]
@@ -94,7 +94,7 @@ def test_visuals_are_where_the_run_recorded_joints_and_feet(record):
 def tracks(commands):
     """Every animated property as floats, by path and name."""
     found = {}
-    for animation in commands[-1].lower()["animations"]:
+    for animation in commands[-1]["animations"]:
         for track in animation["clip"]["tracks"]:
             values = track["values"]
             if not isinstance(values, list):
@@ -166,7 +166,7 @@ def test_footholds_are_where_feet_stood(record):
 
 def test_foothold_plates_appear_when_their_foot_has_landed(record):
     frames = playback(record, fps=30.0)
-    objects = {c["path"]: c for c in (x.lower() for x in scene_commands(frames))}
+    objects = {c["path"]: c for c in scene_commands(frames)[:-1]}
     for foot, name in enumerate(("left", "right")):
         (geometry,) = objects[f"/meshcat/footholds/{name}"]["object"]["geometries"]
         attributes = {
@@ -210,18 +210,20 @@ def test_a_mesh_is_shown(record, tmp_path):
     path = tmp_path / "trunk.stl"
     write_stl(path)
     meshed = with_urdf(record, BOX, f'<mesh filename="{path}"/></geometry>\n      <material')
-    _, _, visuals = load_visuals(meshed)
-    assert visuals[0].geometry.vertices.shape[1] == 3
-    assert len(visuals[0].geometry.faces) == 4
+    _, shapes = load_shapes(meshed)
+    mesh, _ = drawn(shapes.geometryObjects[0].geometry)
+    assert mesh.vertices.shape[1] == 3
+    assert len(mesh.faces) == 4
     assert tc.save_html(meshed, tmp_path / "mesh.html", end=0.2).is_file()
 
 
 def shown(record):
     """Names of the shapes, and where each of them is in the middle of the run."""
-    model, shapes, visuals = load_visuals(record)
+    model, shapes = load_shapes(record)
     row = len(record.time) // 2
     positions, _ = placements(model, shapes, record.q[[row]])
-    return row, dict(zip((visual.name for visual in visuals), positions[0], strict=True))
+    names = (shape.name for shape in shapes.geometryObjects)
+    return row, dict(zip(names, positions[0], strict=True))
 
 
 def without_visuals(record):
