@@ -45,20 +45,15 @@ def _reproduce(module: str, name: str, **less: Any) -> Reproduction:
 
 
 _MODULES = {
-    "table3": "map_errors",
-    "fig5": "map_errors",
-    "table4": "transitions",
-    "fig6": "transitions",
-    "fig7": "transitions",
-    "fig8": "stability",
-    "fig9": "stability",
-    "fig10": "example_one",
-    "fig12": "example_two",
-    "fig13": "example_two",
+    "map_errors": ("table3", "fig5"),
+    "transitions": ("table4", "fig6", "fig7"),
+    "stability": ("fig8", "fig9"),
+    "example_one": ("fig10",),
+    "example_two": ("fig12", "fig13"),
 }
 
 REPRODUCTIONS: dict[str, Callable[..., Reproduction]] = {
-    name: partial(_reproduce, module, name) for name, module in _MODULES.items()
+    name: partial(_reproduce, module, name) for module, names in _MODULES.items() for name in names
 }
 """By the name ``template-control reproduce`` knows them by."""
 
