@@ -7,6 +7,7 @@ import json
 import math
 from collections.abc import Callable
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -72,13 +73,6 @@ _DEFAULTS = {
         {"height": 0.98},
         1600.0,
     ),
-}
-_COLUMNS = {
-    "energy": "E [J]",
-    "angle": "alpha [deg]",
-    "stiffness": "k [kN/m]",
-    "height": "y [m]",
-    "speed": "dx/dt [m/s]",
 }
 _STRIDES = {"walk": StrideKind.WALK, "run": StrideKind.RUN}
 _MAPS = {kind.name.lower(): kind for kind in (MapKind.EXACT, MapKind.IMPROVED, MapKind.PAPER)}
@@ -147,26 +141,35 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     values.add_json(parser, "the branch as JSON")
 
 
+Made = tuple[dict[str, Any], Table, dict[str, Callable[[Path], Path]]]
+"""Result of a command: data as JSON, a table, and what writes its files, by name."""
+
+
 def run(options: argparse.Namespace) -> int:
-    """Follow the branch and report it."""
+    """Follow the branch, or make a file anew, and report it."""
     _complete(options)
+    make = make_family if options.family else make_changes if options.changes else _branch
+    files, paths = Files(), []
     with nullcontext() if options.no_figures else writing(options.output) as folder:
-        if options.family:
-            return make_family(folder, options.json)
-        if options.changes:
-            return make_changes(folder, options.json)
-        return _branch(options, folder)
+        data, shown, writers = make(options)
+        if folder is not None:
+            tried = (files.write(partial(write, folder / n)) for n, write in writers.items())
+            paths = [str(path) for path in tried if path is not None]
+    if make is _branch:
+        data["figures"] = paths
+    word = "figure" if make is _branch else "written"
+    report(options.json, data, shown, lines=(f"{word}: {path}" for path in paths))
+    files.raise_pending()
+    return 0
 
 
 def _complete(options: argparse.Namespace) -> None:
     """Check options of a branch, and set those that are not given: quantities by their names."""
-    for search in ("family", "changes"):
-        if not getattr(options, search):
-            continue
-        branch = ("fix", "controlled", "start", "limits")
-        for other in (*branch, *(("changes",) if search == "family" else ())):
-            if getattr(options, other):
-                raise ParameterError(f"--{other} does not go with --{search}: leave one out")
+    searches = [name for name in ("family", "changes") if getattr(options, name)]
+    if searches:
+        others = [n for n in ("fix", "controlled", "start", "limits") if getattr(options, n)]
+        if others := others + searches[1:]:
+            raise ParameterError(f"--{others[0]} does not go with --{searches[0]}: leave one out")
         return
     defaults = _DEFAULTS[options.gait]
     given = _quantities("--fix", options.fix)
@@ -184,25 +187,21 @@ def _complete(options: argparse.Namespace) -> None:
     options.fix, options.start, options.limits = given or held, start, (low, high)
 
 
-def _branch(options: argparse.Namespace, folder: Path | None) -> int:
-    """Follow one branch, with its figure in ``folder``."""
-    if options.controlled:
+def _branch(options: argparse.Namespace) -> Made:
+    """Follow one branch."""
+    over, controlled = options.over, bool(options.controlled)
+    if controlled:
         points = _controlled(options, _MAPS[options.controlled])
         shown = [*options.fix, "angle"]
     else:
         points = _passive(options)
-        shown = [q for q in QUANTITIES if q not in options.fix and q != options.over]
-    files = Files()
-    paths: list[Path] = []
-    if folder is not None:
-        figure = branch_figure(points, options.over, shown, bool(options.controlled))
-        path = files.write(lambda: save_figure(figure, folder / "branch.png"))
-        paths = [] if path is None else [path]
-    data = {"points": [_data(p) for p in points], "figures": list(map(str, paths))}
-    found = _branch_table(points, options.gait, options.over)
-    report(options.json, data, found, lines=(f"figure: {path}" for path in paths))
-    files.raise_pending()
-    return 0
+        shown = [q for q in QUANTITIES if q not in options.fix and q != over]
+
+    def draw(path: Path) -> Path:
+        return save_figure(branch_figure(points, over, shown, controlled), path)
+
+    data: dict[str, Any] = {"points": [_data(p) for p in points]}
+    return data, _branch_table(points, options.gait, over), {"branch.png": draw}
 
 
 def _passive(options: argparse.Namespace) -> list[BranchPoint]:
@@ -264,8 +263,8 @@ def _data(point: BranchPoint) -> dict[str, Any]:
 
 def _branch_table(points: list[BranchPoint], gait: str, over: str) -> Table:
     controlled = points[0].target is not None
-    columns = [f"target {_COLUMNS[over]}"] if controlled else []
-    columns += [_COLUMNS[name] for name in QUANTITIES]
+    columns = [f"target {UNITS[over][1]}"] if controlled else []
+    columns += [UNITS[name][1] for name in QUANTITIES]
     columns += ["|eig.|" if controlled else "eigenvalues", "stability"]
     every, rows = max(1, len(points) // _TABLE_ROWS), []
     for i, point in enumerate(points):
@@ -282,7 +281,7 @@ def _branch_table(points: list[BranchPoint], gait: str, over: str) -> Table:
 
 
 def _number(name: str, value: float) -> str:
-    return f"{UNITS[name][1] * value:.{4 if name in ('height', 'speed') else 3}f}"
+    return f"{UNITS[name][2] * value:.{4 if name in ('height', 'speed') else 3}f}"
 
 
 def _eigenvalues(point: BranchPoint) -> str:
@@ -298,81 +297,72 @@ def _eigenvalues(point: BranchPoint) -> str:
 Chains = tuple[list[Member], ...]
 
 _TABLE_STEP = 0.1  # [m/s]
-Column = tuple[str, str, Callable[[WalkingGait, Figures], float]]
-# Label in the figure; header and format in the table, if it is there; value.
+Column = tuple[str, str, str, Callable[[WalkingGait, Figures], float]]
+# Label in the figure; header in the table, if it is there, and format; value.
 _SHOWN: tuple[Column, ...] = (
-    ("mean speed [m/s]", "m/s .3f", lambda g, _: g.mean_speed),
-    ("leg stiffness [kN/m]", "k kN/m .2f", lambda g, _: 1e-3 * g.parameters.leg_stiffness),
+    ("mean speed [m/s]", "m/s", ".3f", lambda g, _: g.mean_speed),
+    ("leg stiffness [kN/m]", "k kN/m", ".2f", lambda g, _: 1e-3 * g.parameters.leg_stiffness),
     (
         "touchdown angle [deg]",
-        "alpha .2f",
+        "alpha",
+        ".2f",
         lambda g, _: math.degrees(g.controls[Slot.TOUCHDOWN_ANGLE]),
     ),
-    ("height at VLO [m]", "y m .4f", lambda g, _: g.vlo[1]),
-    ("step length [m]", "step m .3f", lambda g, _: g.step_length),
-    ("step duration [s]", "step s .3f", lambda g, _: g.step_duration),
-    ("least singular value of B", "", lambda _, f: f.authority),
-    ("share of double stance", "", lambda _, f: f.double_stance),
+    ("height at VLO [m]", "y m", ".4f", lambda g, _: g.vlo[1]),
+    ("step length [m]", "step m", ".3f", lambda g, _: g.step_length),
+    ("step duration [s]", "step s", ".3f", lambda g, _: g.step_duration),
+    ("least singular value of B", "", "", lambda _, f: f.authority),
+    ("share of double stance", "", "", lambda _, f: f.double_stance),
 )
 _EIGENVALUES: tuple[Column, ...] = (
-    ("passive", "passive .2f", lambda _, f: f.passive),
-    ("three controls", "3 u .2f", lambda _, f: f.without),
-    ("with push-off", "4 u .2f", lambda _, f: f.closed),
+    ("passive", "passive", ".2f", lambda _, f: f.passive),
+    ("three controls", "3 u", ".2f", lambda _, f: f.without),
+    ("with push-off", "4 u", ".2f", lambda _, f: f.closed),
 )
 
 
-def make_family(folder: Path | None, as_json: bool) -> int:
-    """Search the family, write its file and figure into a folder, if any, and print it."""
-    files, chains = Files(), search_family()
+def make_family(options: argparse.Namespace) -> Made:
+    """Search the family: its file, its figure and a table."""
+    chains = search_family()
     data = family_data(chains)
-    paths: list[Path | None] = []
-    if folder is not None:
-        text = json.dumps(data, indent=1) + "\n"
+
+    def draw(path: Path) -> Path:
         pairs = {"largest |eigenvalue|": _curves(chains, _EIGENVALUES)}
-        figure = speed_family_figure(_curves(chains, _SHOWN), pairs)
-        paths = [
-            files.write(lambda: storage.write_text(folder / "walking.json", text)),
-            files.write(lambda: save_figure(figure, folder / "by_speed.png")),
-        ]
-    lines = (f"written: {path}" for path in paths if path is not None)
-    report(as_json, data, _family_table(chains), lines=lines)
-    files.raise_pending()
-    return 0
+        return save_figure(speed_family_figure(_curves(chains, _SHOWN), pairs), path)
+
+    text = json.dumps(data, indent=1) + "\n"
+    write = partial(storage.write_text, text=text)
+    return data, _family_table(chains), {"walking.json": write, "by_speed.png": draw}
 
 
-def make_changes(folder: Path | None, as_json: bool) -> int:
-    """Search the changes of speed, write their file into a folder, if any, and print them."""
+def make_changes(options: argparse.Namespace) -> Made:
+    """Search the changes of speed: their file and a table."""
     with progress_bar("changes of speed", 1.0) as done:
         found = search_changes(done=done)
-    data, files, lines = change_data(found), Files(), []
-    if folder is not None:
-        text = json.dumps(data) + "\n"
-        path = files.write(lambda: storage.write_text(folder / "speed_changes.json", text))
-        lines = [] if path is None else [f"written: {path}"]
+    data = change_data(found)
     speeds = sorted({speed for ends in found for speed in ends})
     steps = {ends: str(len(change.controls)) for ends, (_, change) in found.items()}
     rows = [[f"{a:g}", *(steps.get((a, b), "") for b in speeds)] for a in speeds]
     title = "steps from one speed at VLO [m/s] to another one, for 80 kg and l0 = 1 m"
-    report(as_json, data, table(title, ["", *map("{:g}".format, speeds)], rows), lines=lines)
-    files.raise_pending()
-    return 0
+    shown = table(title, ["", *map("{:g}".format, speeds)], rows)
+    write = partial(storage.write_text, text=json.dumps(data) + "\n")
+    return data, shown, {"speed_changes.json": write}
 
 
 def _curves(chains: Chains, columns: tuple[Column, ...]) -> dict[str, list[Array]]:
     return {
         label: [np.array([value(*member) for member in chain]) for chain in chains]
-        for label, _, value in columns
+        for label, _, _, value in columns
     }
 
 
 def _family_table(chains: Chains) -> Table:
-    columns = [(how.rpartition(" "), of) for _, how, of in (*_SHOWN, *_EIGENVALUES) if how]
+    columns = [column[1:] for column in (*_SHOWN, *_EIGENVALUES) if column[1]]
     rows, wanted = [], 0.0
     for member in (member for chain in chains for member in chain):
         speed = member[0].mean_speed
         if speed >= wanted:
             wanted = _TABLE_STEP * (np.floor(speed / _TABLE_STEP) + 1.0)
-            rows.append([format(of(*member), form) for (_, _, form), of in columns])
+            rows.append([format(of(*member), form) for _, form, of in columns])
     title = "walking gaits by speed, for 80 kg and l0 = 1 m; largest eigenvalues"
-    headers = [header for (header, _, _), _ in columns]
-    return table(title, headers, rows, left=0, box=SIMPLE_HEAD)
+    return table(title, [column[0] for column in columns], rows, left=0, box=SIMPLE_HEAD)

@@ -27,12 +27,13 @@ _MARKS = {
 _SPEED = "mean speed [m/s]"
 _MAPS = ("#db7321", "#2a6196", "#3a9a4a")
 UNITS = {
-    "energy": ("energy [J]", 1.0),
-    "angle": ("touchdown angle [deg]", 180.0 / np.pi),
-    "stiffness": ("leg stiffness [kN/m]", 1e-3),
-    "height": ("height [m]", 1.0),
-    "speed": ("dx/dt [m/s]", 1.0),
+    "energy": ("energy [J]", "E [J]", 1.0),
+    "angle": ("touchdown angle [deg]", "alpha [deg]", 180.0 / np.pi),
+    "stiffness": ("leg stiffness [kN/m]", "k [kN/m]", 1e-3),
+    "height": ("height [m]", "y [m]", 1.0),
+    "speed": ("dx/dt [m/s]", "dx/dt [m/s]", 1.0),
 }
+"""By quantity: its label in a figure, its header in a table, and its factor from SI units."""
 
 
 @checked
@@ -47,11 +48,11 @@ def branch_figure(
         show: quantities on the vertical axes.
         controlled: ``over`` is of the controller's target, not of the gait it leads to.
     """
-    label, unit = UNITS[over]
+    label, _, unit = UNITS[over]
     if controlled:
         label, over = f"target's {label}", "target"
     x = unit * np.array([p.quantity(over) for p in points])
-    curves = [(UNITS[s][0], UNITS[s][1] * np.array([p.quantity(s) for p in points])) for s in show]
+    curves = [(UNITS[s][0], UNITS[s][2] * np.array([p.quantity(s) for p in points])) for s in show]
     largest = np.array([np.abs(p.eigenvalues).max() for p in points])
     curves.append(("largest |eigenvalue|", largest))
     figure, panels = panelled(3.4, 1, len(curves))
