@@ -43,23 +43,18 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Draw and print as the options say; returns 0."""
-    files, figure = Files(), None
+    files, figure, path = Files(), None, options.output
     if not options.no_figure:
-        _check(options.output)
-        figure = files.write(lambda: save(AUTOMATON, options.output))
+        _check(path)
+        figure = files.write(lambda: save_figure(automaton_figure(AUTOMATON), path, dpi=100))
     lines = () if figure is None else (f"figure: {figure}",)
     report(options.json, describe(AUTOMATON), *tables(AUTOMATON), lines=lines)
     files.raise_pending()
     return 0
 
 
-def save(automaton: Automaton, path: Path) -> Path:
-    """Draw an automaton into a file; folders on the way to it are made."""
-    _check(path)
-    return save_figure(automaton_figure(automaton), path, dpi=100)
-
-
 def _check(path: Path) -> None:
+    """Refuse a file that cannot be written; folders on the way to it are made."""
     if path.suffix.lower() not in _SUFFIXES:
         raise ParameterError(f"--output is {path}: give a file ending in {', '.join(_SUFFIXES)}")
     try:

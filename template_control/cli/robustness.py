@@ -12,7 +12,6 @@ from template_control.robustness.disturbances import AFTER, ALL
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.severity_sweep import SETTLED, measure
 from template_control.run.experiment import Experiment
-from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import writing
 from template_control.view.trial_figures import robustness_figure
@@ -75,7 +74,7 @@ def run(options: argparse.Namespace) -> int:
 def report(found: Robustness) -> Report:
     """Report of the findings."""
     title = (
-        f"{found.robot} at {_speed(found.gait):.3f} m/s in {found.plant}; undisturbed it is"
+        f"{found.robot} at {found.gait.mean_speed:.3f} m/s in {found.plant}; undisturbed it is"
         f" {100 * found.speed_error:+.2f} % in speed and {100 * found.height_error:+.2f} % in"
         " height from its gait"
     )
@@ -95,7 +94,7 @@ def data(found: Robustness) -> dict[str, Any]:
     return {
         "robot": found.robot,
         "plant": found.plant,
-        "gait": {"mean_speed": _speed(found.gait), height: float(found.gait.state[1])},
+        "gait": {"mean_speed": found.gait.mean_speed, height: float(found.gait.state[1])},
         "undisturbed": {"speed_error": found.speed_error, "height_error": found.height_error},
         "disturbances": {
             f.disturbance.name: {
@@ -118,10 +117,6 @@ def data(found: Robustness) -> dict[str, Any]:
             for f in found.findings
         },
     }
-
-
-def _speed(gait: Gait) -> float:
-    return gait.step_length / gait.step_duration
 
 
 def _row(finding: Finding) -> list[str]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 from contextlib import AbstractContextManager, nullcontext
-from pathlib import Path
 
 from template_control.checks import option_types as values
 from template_control.errors import ParameterError
-from template_control.paper.reproduction import LONG, REPRODUCTIONS, Reproduction
+from template_control.paper.reproduction import LONG, REPRODUCTIONS
 from template_control.storage import Files, writing
 from template_control.terminal import plain_console, report, table
 from template_control.view.style import save_figure
@@ -36,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
         with _announced(options.name):
             result = REPRODUCTIONS[options.name]()
         if folder is not None:
-            paths = files.write(lambda: _save(result, folder)) or []
+            drawn = [(figure, folder / f"{n}.png") for n, figure in result.figures.items()]
+            paths = files.write(lambda: [save_figure(*one) for one in drawn]) or []
     data = {"name": options.name, **result.data, "figures": [str(p) for p in paths]}
     lines = [*(f"- {note}" for note in result.notes), *(f"figure: {path}" for path in paths)]
     report(options.json, data, table(result.title, result.columns, result.rows), lines=lines)
@@ -51,7 +51,3 @@ def _announced(name: str) -> AbstractContextManager[object]:
         return console.status(f"computing {name}")
     console.print(f"computing {name}: about {LONG[name]} s on two cores", highlight=False)
     return nullcontext()
-
-
-def _save(result: Reproduction, folder: Path) -> list[Path]:
-    return [save_figure(figure, folder / f"{name}.png") for name, figure in result.figures.items()]

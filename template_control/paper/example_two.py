@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -53,17 +53,6 @@ class Liftoff:
     peak: Array
 
 
-def beginning(record: Record, seconds: float) -> Record:
-    """Samples of a run's first seconds; all of its sections and metadata are kept."""
-    count, end = len(record.time), int(np.searchsorted(record.time, seconds))
-    cut = {
-        f.name: getattr(record, f.name)[:end]
-        for f in fields(record)
-        if f.name != "metadata" and len(getattr(record, f.name)) == count
-    }
-    return replace(record, **cut)
-
-
 def _entries(record: Record, node: str) -> NDArray[np.intp]:
     """Samples at which the run enters ``node`` of the automaton."""
     inside = record.node == record.nodes.index(node)
@@ -106,8 +95,9 @@ def states_figure(
     target: Array,
 ) -> Figure:
     """y, phi and E at VLO (steps + 1, 3) over the steps: a row a plant, a line a planner."""
-    figure = Figure(figsize=(9.5, 1.7 * len(plants) + 0.6), layout="constrained")
-    panels = figure.subplots(len(plants), 3, sharex=True, sharey="col", squeeze=False)
+    size = {"height": 1.7 * len(plants) + 0.6, "width": 9.5}
+    figure, panels = panelled(rows=len(plants), columns=3, **size, sharex=True, sharey="col")
+    panels = panels.reshape(-1, 3)
     unit = np.array([1.0, 180.0 / np.pi, 1.0])
     spans = np.array(((0.96, 1.005), (-12.0, 6.0), (819.0, 832.0)))
     for row, plant in zip(panels, plants, strict=True):
@@ -291,7 +281,7 @@ def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Repr
         done = counted(pool.map(partial(_walk, steps=steps), cases), len(cases), "walks")
         walks = dict(zip(cases, done, strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
-    sticks = stick_diagram(beginning(record, 2.2), Look(titled=False))
+    sticks = stick_diagram(record, Look(0.0, 2.199, titled=False))
     sticks.axes[0].set_title("five-link from z_0: LQR, PyBullet")
     gait = _gait()
     target = sections(gait, gait.vlo[None])[0]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -12,17 +13,17 @@ from template_control.checks.checked import checked
 from template_control.slip.gaits.branch import BranchPoint, Kind, Special
 from template_control.view.style import gallery, panelled
 
-_KINDS = {
-    Kind.STABLE: "#2a6196",
-    Kind.SADDLE: "#db7321",
-    Kind.UNSTABLE: "#6b7078",
-    Kind.NEUTRAL: "#3a9a4a",
-}
-_MARKS = {
-    Special.FOLD: "D",
-    Special.SADDLE_NODE: "s",
-    Special.FLIP: "v",
-    Special.NEIMARK_SACKER: "o",
+_POINT: dict[str, Any] = {"marker": ".", "markersize": 3}
+_SPECIAL: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
+_LOOKS: dict[Kind | Special, dict[str, Any]] = {
+    Kind.STABLE: {**_POINT, "color": "#2a6196"},
+    Kind.SADDLE: {**_POINT, "color": "#db7321"},
+    Kind.UNSTABLE: {**_POINT, "color": "#6b7078"},
+    Kind.NEUTRAL: {**_POINT, "color": "#3a9a4a"},
+    Special.FOLD: {**_SPECIAL, "marker": "D"},
+    Special.SADDLE_NODE: {**_SPECIAL, "marker": "s"},
+    Special.FLIP: {**_SPECIAL, "marker": "v"},
+    Special.NEIMARK_SACKER: {**_SPECIAL, "marker": "o"},
 }
 _SPEED = "mean speed [m/s]"
 _MAPS = ("#db7321", "#2a6196", "#3a9a4a")
@@ -58,29 +59,15 @@ def branch_figure(
     figure, panels = panelled(3.4, 1, len(curves))
     for axes, (name, y) in zip(panels, curves, strict=True):
         axes.plot(x, y, color="0.8", linewidth=0.8, zorder=1)
-        for kind, color in _KINDS.items():
-            of = np.array([p.kind is kind and p.special is None for p in points])
+        for what in (*Kind, *dict.fromkeys(p.special for p in points if p.special)):
+            of = np.array([(p.special or p.kind) is what for p in points])
             if of.any():
-                axes.plot(x[of], y[of], ".", color=color, markersize=3, label=kind.value, zorder=2)
-        for i, point in enumerate(points):
-            if point.special is not None:
-                axes.plot(
-                    x[i], y[i], _MARKS[point.special], color="black", markersize=5, fillstyle="none"
-                )
+                axes.plot(x[of], y[of], linestyle="", label=what.value, **_LOOKS[what])
         axes.set(xlabel=label, ylabel=name)
     axes.axhline(1.0, color="0.4", linewidth=0.8)
     axes.set_ylim(0.0, min(3.0, max(1.1, 1.1 * largest.max())))
-    used = list(dict.fromkeys(p.special for p in points if p.special is not None))
-    marks = [
-        axes.plot([], [], _MARKS[s], color="black", fillstyle="none", markersize=5)[0] for s in used
-    ]
-    figure.legend(
-        [*axes.get_legend_handles_labels()[0], *marks],
-        [*axes.get_legend_handles_labels()[1], *(s.value for s in used)],
-        loc="outside upper center",
-        ncols=4,
-        fontsize=8,
-    )
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, fontsize=8)
     return figure
 
 

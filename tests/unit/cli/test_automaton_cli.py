@@ -14,9 +14,8 @@ from matplotlib.colors import same_color
 from matplotlib.patches import Circle, FancyArrowPatch
 from places import ROOT
 
-from template_control.cli.automaton import describe, save
+from template_control.cli.automaton import describe
 from template_control.cli.main import main
-from template_control.errors import RecordError
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.hybrid import Automaton, Edge, Node
 from template_control.slip.automaton.vocabulary import Event, Outcome, Phase, Reset, Slot
@@ -28,6 +27,7 @@ from template_control.view.automaton_figure import (
     mathtext,
     successions,
 )
+from template_control.view.style import save_figure
 
 
 def node(name, *edges, phase=Phase.SS):
@@ -173,7 +173,7 @@ def test_figure_is_written_into_a_new_folder(suffix, tmp_path, capsys):
     ids=["library", "hopper"],
 )
 def test_file_holds_every_node_guard_and_no_more_arrows(automaton, tmp_path):
-    save(automaton, tmp_path / "fig.svg")
+    save_figure(automaton_figure(automaton), tmp_path / "fig.svg")
     svg = (tmp_path / "fig.svg").read_text()  # texts are outlines with their source beside
     edges = list(successions(automaton))
     for name in [n.name for n in automaton.nodes] + [e.guard for _, _, e in edges]:
@@ -298,6 +298,6 @@ def test_a_bad_output_is_one_line(output, culprit, tmp_path, monkeypatch, refuse
     assert "give a" in line
 
 
-def test_save_raises_the_librarys_own_error(tmp_path):
-    with pytest.raises(RecordError, match="give another --output"):
-        save(HOPPER, tmp_path / ("x" * 300 + ".png"))
+def test_a_name_that_is_too_long_is_one_line(tmp_path, refused):
+    path = tmp_path / ("x" * 300 + ".png")
+    assert "give another --output" in refused(["automaton", "--output", str(path)])

@@ -14,7 +14,6 @@ from template_control.paper.example_two import (
     EARLIER,
     PLANNERS,
     START,
-    beginning,
     liftoff,
     sections,
     start_state,
@@ -110,10 +109,3 @@ def test_each_foot_has_its_own_template_force_about_liftoff(first_steps):
         record.template_force[near, 1, 1],
     )
     assert np.all(force < 100.0), "the lifting leg's fades"
-
-
-def test_beginning_cuts_the_samples(first_steps):
-    record = beginning(first_steps(), 0.1)
-    assert record.time[-1] < 0.1
-    assert len(record.q) == len(record.time) == 100
-    assert len(record.section_time) == 3
