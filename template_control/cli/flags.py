@@ -293,23 +293,18 @@ def _push(text: str) -> Push:
 
 
 def _turns(texts: list[str]) -> list[list[float]]:
-    turns = [_turn(text) for text in texts]
-    times = [time for time, _ in turns]
-    twice = next((time for time in times if times.count(time) > 1), None)
-    if twice is not None:
-        raise ParameterError(f"--turn has two rates from {twice:g} s on: give one")
-    return [list(turn) for turn in sorted({0.0: 0.0, **dict(turns)}.items())]
-
-
-def _turn(text: str) -> tuple[float, float]:
-    """Time from which a rate holds, and the rate."""
-    rate, at, time = text.partition("@")
-    where = f"--turn {text}"
-    if not (rate and (time or not at)):
-        raise ParameterError(f"{where}: give RATE or RATE@TIME, such as -0.2@10")
-    return typed.number(f"{where}: time", time or "0", NotNegative), typed.number(
-        f"{where}: rate", rate, TurningRate
-    )
+    """Times from which rates hold, each with its rate; straight on at first."""
+    turns: dict[float, float] = {}
+    for text in texts:
+        rate, at, time = text.partition("@")
+        where = f"--turn {text}"
+        if not (rate and (time or not at)):
+            raise ParameterError(f"{where}: give RATE or RATE@TIME, such as -0.2@10")
+        begin = typed.number(f"{where}: time", time or "0", NotNegative)
+        if begin in turns:
+            raise ParameterError(f"--turn has two rates from {begin:g} s on: give one")
+        turns[begin] = typed.number(f"{where}: rate", rate, TurningRate)
+    return [list(turn) for turn in sorted({0.0: 0.0, **turns}.items())]
 
 
 DISTURBANCES = (

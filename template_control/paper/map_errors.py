@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -130,29 +130,6 @@ def error_figure(edges: Array, counts: Array, means: Mapping[str, tuple[Array, A
             axes.plot(centres, values[panel], "o-", color=color, markersize=4, label=name)
         axes.set(xlabel="d_v", ylabel=label, yscale="log")
         axes.legend(loc="lower right")
-    return figure
-
-
-def stride_figure(
-    paths: Sequence[tuple[str, Array]],
-    legs: Sequence[tuple[Array, Array]],
-    events: Sequence[tuple[str, float, float]],
-    title: str,
-) -> Figure:
-    """A stride's CoM paths (n, 2), its legs (toe, CoM), and its events with x and y [m]."""
-    figure, (axes,) = panelled(4.0)
-    for toe, com in legs:
-        axes.plot([toe[0], com[0]], [toe[1], com[1]], color="0.75", linewidth=1.0, zorder=1)
-    for color, (label, path) in zip(_COLORS, paths, strict=False):
-        axes.plot(path[:, 0], path[:, 1], color=color, linewidth=1.6, label=label, zorder=2)
-    for i, (name, x, y) in enumerate(events):
-        axes.plot(x, y, "o", color="black", markersize=3.5, zorder=3)
-        axes.annotate(
-            name, (x, y), (0, 9 + 12 * (i % 2)), textcoords="offset points", ha="center", fontsize=8
-        )
-    axes.axhline(0.0, color="0.4", linewidth=0.8)
-    axes.set(xlabel="x [m]", ylabel="y [m]", title=title, ylim=(-0.03, 1.3))
-    axes.legend(loc="upper right", ncols=2)
     return figure
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from template_control.arrays import Array
-from template_control.paper.map_errors import stride_figure
 from template_control.paper.reproduction import MAPS, Reproduction
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
@@ -16,7 +16,7 @@ from template_control.slip.dynamics.stride import FiredEvent, Stride, controls, 
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.view.style import in_words
+from template_control.view.style import LEFT, RIGHT, in_words, panelled
 
 P = SlipParameters()
 WRT_STATE = np.array([1.101, 0.9797, -0.0442])
@@ -106,15 +106,29 @@ def _solution(solution: StepSolution, end: list[float]) -> dict[str, Any]:
     }
 
 
-def _drawn(strides: list[tuple[str, Stride]], title: str) -> Any:
+def _drawn(strides: list[tuple[str, Stride]], title: str) -> Figure:
+    """CoM paths of strides by name, with legs and events of the first."""
+    figure, (axes,) = panelled(4.0)
     main = strides[0][1]
-    legs: list[tuple[Array, Array]] = []
     for t in np.linspace(0.0, main.duration, 25):
-        meta, com = main.meta[int(main.rows(t))], main.sample(t)[0, :2]
-        legs += [(np.array([meta[3 + i], 0.0]), com) for i in range(2) if meta[5 + i] > 0.0]
-    paths = [(name, s.sample(np.linspace(0.0, s.duration, 200))[:, :2]) for name, s in strides]
-    events = [(_name(e), float(e.state[0]), float(e.state[1])) for e in main.events]
-    return stride_figure(paths, legs, events, title)
+        meta, com = main.meta[int(main.rows(t))], main.sample(t)[0]
+        for toe, stiffness in zip(meta[3:5], meta[5:7], strict=True):
+            if stiffness > 0.0:
+                axes.plot([toe, com[0]], [0.0, com[1]], color="0.75", linewidth=1.0, zorder=1)
+    for color, (name, stride) in zip((RIGHT, LEFT), strides, strict=True):
+        path = stride.sample(np.linspace(0.0, stride.duration, 200))
+        axes.plot(path[:, 0], path[:, 1], color=color, linewidth=1.6, label=name, zorder=2)
+    for i, event in enumerate(main.events):
+        place = event.state[:2]
+        axes.plot(*place, "o", color="black", markersize=3.5, zorder=3)
+        axes.annotate(
+            _name(event), place, (0, 9 + 12 * (i % 2)), textcoords="offset points", ha="center",
+            fontsize=8,
+        )  # fmt: skip
+    axes.axhline(0.0, color="0.4", linewidth=0.8)
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title, ylim=(-0.03, 1.3))
+    axes.legend(loc="upper right", ncols=2)
+    return figure
 
 
 _EVENT_COLUMNS = ("node left", "event", "t [s]", "x [m]", "y [m]", "dx/dt [m/s]", "dy/dt [m/s]")

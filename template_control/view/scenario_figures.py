@@ -43,6 +43,7 @@ _LOOK = Look()
 _WHOLE = slice(None)
 ROUTE_FIGURES = ("scenario", "transitions")  # file names of a scenario's further figures
 _AROUND = 1.2  # [s] shown on either side of a transition
+_ENERGIES = ("forward kinetic", LEFT), ("gravitational", RIGHT), ("template's total", TEMPLATE)
 
 
 def _mark_footholds(axes: Axes, x: Array) -> None:
@@ -88,26 +89,22 @@ def _plot_legs(axes: Axes, time: Array, values: Array, name: str) -> None:
 
 def energy_figure(record: ScenarioRecord) -> Figure:
     """Energies around each transition (Fig. 10c, d)."""
-    energies = record.energies()
-    named = {
-        "forward kinetic": energies["forward"],
-        "gravitational": energies["gravity"],
-        "template's total": energies["total"],
-    }
-    return _around_transitions(record, named, as_text(record.metadata["name"]), _LOOK)
+    e = record.energies()
+    energies = e["forward"], e["gravity"], e["total"]
+    return _around_transitions(record, energies, as_text(record.metadata["name"]), _LOOK)
 
 
 def _around_transitions(
-    record: Record | ScenarioRecord, energies: dict[str, Array], title: str, look: Look
+    record: Record | ScenarioRecord, energies: tuple[Array, Array, Array], title: str, look: Look
 ) -> Figure:
-    """Energies (T,) around each transition, by name, less their first values."""
+    """Energies (T,) around each transition, less their first values."""
     spans = _transitions(record)
     figure, panels = panelled(3.8, 1, max(len(spans), 1))
     for axes, span in zip(panels, spans, strict=False):
         begin, end, name = span
         w = (record.time > begin - _AROUND) & (record.time < end + _AROUND)
         shade(axes, record, _WHOLE)
-        for (label, energy), color in zip(energies.items(), (LEFT, RIGHT, TEMPLATE), strict=True):
+        for energy, (label, color) in zip(energies, _ENERGIES, strict=True):
             axes.plot(record.time[w], energy[w] - energy[w][0], color=color, label=label)
         mark_transitions(axes, [span])
         axes.set(xlabel="time [s]", xlim=(record.time[w][0], record.time[w][-1]))
@@ -194,12 +191,10 @@ def _transitions(record: Record | ScenarioRecord) -> list[tuple[float, float, st
 def transition_energies(record: Record, look: Look = _LOOK) -> Figure:
     """Energies of the robot's CoM and of the template around each transition (Fig. 10c, d)."""
     p = record.template
-    named = {
-        "forward kinetic": 0.5 * p.mass * record.com_velocity[:, 0] ** 2,
-        "gravitational": p.mass * p.gravity * record.com[:, 1],
-        "template's total": template_energies(record)["total"],
-    }
-    return _around_transitions(record, named, as_text(record.robot_name), look)
+    forward = 0.5 * p.mass * record.com_velocity[:, 0] ** 2
+    gravity = p.mass * p.gravity * record.com[:, 1]
+    energies = forward, gravity, template_energies(record)["total"]
+    return _around_transitions(record, energies, as_text(record.robot_name), look)
 
 
 def route_figures(record: Record, template: ScenarioRecord) -> dict[str, Draw]:
