@@ -183,27 +183,21 @@ def floating_rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:
 def joint_table(figures: dict[str, Any]) -> Table:
     """What each joint did of what it may, marked where that was more."""
     title = "joints: torque, peak / RMS of limit; speed, peak of limit; angle of range"
-    columns = ("", "torque [N m]", "speed [rad/s]", "angle [rad]")
-    return table(title, columns, _joint_rows(figures))
-
-
-def _joint_rows(figures: dict[str, Any]) -> Iterator[tuple[str, ...]]:
+    rows, past = [], ", past its limit"
     for joint, torque in figures["joint_torque"].items():
         speed, angle = figures["joint_speed"][joint], figures["joint_angle"][joint]
-        fast = _past_limit(speed["peak"] > speed["limit"])
-        far = _past_limit(angle["least"] < angle["lower"] or angle["most"] > angle["upper"])
-        yield (
-            joint,
-            f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g}",
-            f"{speed['peak']:.3g} of {speed['limit']:g}{fast}",
-            f"{angle['least']:.2f}..{angle['most']:.2f}"
-            f" of {angle['lower']:.2f}..{angle['upper']:.2f}{far}",
+        fast = past if speed["peak"] > speed["limit"] else ""
+        far = past if angle["least"] < angle["lower"] or angle["most"] > angle["upper"] else ""
+        went = f"{angle['least']:.2f}..{angle['most']:.2f}"
+        rows.append(
+            (
+                joint,
+                f"{torque['peak']:.3g} / {torque['rms']:.3g} of {torque['limit']:g}",
+                f"{speed['peak']:.3g} of {speed['limit']:g}{fast}",
+                f"{went} of {angle['lower']:.2f}..{angle['upper']:.2f}{far}",
+            )
         )
-
-
-def _past_limit(past: bool) -> str:
-    """The mark of a figure that is past its limit."""
-    return ", past its limit" if past else ""
+    return table(title, ("", "torque [N m]", "speed [rad/s]", "angle [rad]"), rows)
 
 
 def failures_text(figures: dict[str, Any]) -> str:
