@@ -45,52 +45,45 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
     }
 
 
+# Name, the paper's number, and ours from :func:`_shown`.
+_ROWS = (
+    ("completed", "yes", "{ended}"),
+    ("walking speed before [m/s]", "1.17", "{walking_speed_before:.3f}"),
+    ("speed error RMS, all sections [m/s]", "", "{speed_error_rms:.2g}"),
+    ("speed error RMS, running [m/s]", "", "{speed_error_rms_running:.2g}"),
+    ("speed error max [m/s]", "", "{speed_error_max:.2g}"),
+    ("leg stiffness at 5 m/s [kN/m]", f"{_PAPER_STIFFNESS / 1e3:g}", "{kilonewtons:.2f}"),
+    ("apex before RWT", "1.754  0.9766", "{rwt_apex}"),
+    ("VLO after RWT", "", "{rwt_vlo}"),
+    ("walking steps after RWT", "", "{walking_steps_after}"),
+    ("last VLO (target 1.1  0.98  0)", "1.085  0.9807  -0.018", "{last_vlo}"),
+    ("energy phase, walking", "out", "{walking[0]:.2f} to {walking[1]:.2f}"),
+    ("energy phase, running", "in", "{running[0]:+.2f} to {running[1]:+.2f}"),
+)
+
+
+def _shown(s: dict[str, Any]) -> dict[str, Any]:
+    """A summary, with what the table has of it in other words or units."""
+    states = ("rwt_apex", "rwt_vlo", "last_vlo")
+    return {
+        **s,
+        **{name: "  ".join(f"{value:.4f}" for value in s[name]) for name in states},
+        **{gait: s[f"energy_phase_{gait}"] for gait in ("walking", "running")},
+        "ended": "yes" if s["completed"] else "no",
+        "kilonewtons": s["stiffness_at_5"] / 1e3,
+    }
+
+
 def fig10() -> Reproduction:
     """Example I on the paper's map, and the tracking error with each map."""
     records = {kind: simulate_scenario(example_one(kind)) for kind in MAPS}
     data = {kind.name.lower(): summary(record) for kind, record in records.items()}
-
-    def row(name: str, published: str, text: Any) -> tuple[str, ...]:
-        return (name, published, *(text(s) for s in data.values()))
-
-    def state(values: list[float]) -> str:
-        return "  ".join(f"{value:.4f}" for value in values)
-
-    rows = [
-        row("completed", "yes", lambda s: "yes" if s["completed"] else "no"),
-        row("walking speed before [m/s]", "1.17", lambda s: f"{s['walking_speed_before']:.3f}"),
-        row("speed error RMS, all sections [m/s]", "", lambda s: f"{s['speed_error_rms']:.2g}"),
-        row("speed error RMS, running [m/s]", "", lambda s: f"{s['speed_error_rms_running']:.2g}"),
-        row("speed error max [m/s]", "", lambda s: f"{s['speed_error_max']:.2g}"),
-        row(
-            "leg stiffness at 5 m/s [kN/m]",
-            f"{_PAPER_STIFFNESS / 1e3:g}",
-            lambda s: f"{s['stiffness_at_5'] / 1e3:.2f}",
-        ),
-        row("apex before RWT", "1.754  0.9766", lambda s: state(s["rwt_apex"])),
-        row("VLO after RWT", "", lambda s: state(s["rwt_vlo"])),
-        row("walking steps after RWT", "", lambda s: f"{s['walking_steps_after']}"),
-        row(
-            "last VLO (target 1.1  0.98  0)",
-            "1.085  0.9807  -0.018",
-            lambda s: state(s["last_vlo"]),
-        ),
-        row(
-            "energy phase, walking",
-            "out",
-            lambda s: f"{s['energy_phase_walking'][0]:.2f} to {s['energy_phase_walking'][1]:.2f}",
-        ),
-        row(
-            "energy phase, running",
-            "in",
-            lambda s: f"{s['energy_phase_running'][0]:+.2f} to {s['energy_phase_running'][1]:+.2f}",
-        ),
-    ]
+    shown = [_shown(s) for s in data.values()]
     record = records[MapKind.PAPER]
     return Reproduction(
         title="Fig. 10: Example I",
         columns=("", "paper", *(f"{kind.name.lower()} map" for kind in MAPS)),
-        rows=rows,
+        rows=[(name, paper, *(text.format(**s) for s in shown)) for name, paper, text in _ROWS],
         data={**data, "published": {"stiffness_at_5": _PAPER_STIFFNESS}},
         notes=(
             "The simulation is exact in every column; the columns differ in the map that the"
