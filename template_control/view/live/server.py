@@ -18,7 +18,7 @@ PORTS = range(8080, 8180)  # tried in turn where no port is asked for
 _ENDS = 10.0  # [s] that a server's thread may take to end
 # A browser opens connections ahead of use, and closes those that it does not need.
 _UNUSED = "opening handshake failed"
-_LOCAL = ("127.0.0.1", "localhost", "[::1]")
+_LOCAL = ("127.0.0.1", "localhost", "::1")
 
 
 def is_own(host: str, origin: str | None) -> bool:
@@ -27,7 +27,7 @@ def is_own(host: str, origin: str | None) -> bool:
     A browser lets any page that it shows open a websocket here, and says in ``Origin`` whose page
     it is. A page whose name was made to lead here has that name in ``Host``.
     """
-    if urlsplit(f"http://{host}").hostname not in [name.strip("[]") for name in _LOCAL]:
+    if urlsplit(f"http://{host}").hostname not in _LOCAL:
         return False
     return origin is None or urlsplit(origin).netloc == host
 

@@ -29,9 +29,10 @@ from template_control.view.replay.robot_visuals import drawn, foot_sides, load_s
 from template_control.view.style import COM, TEMPLATE, feet_shown
 
 _AROUND = 11  # places that a height is the mean of
+Surface = tuple[Array, IntArray]  # vertices (N, 3) [m] and faces (M, 3)
 
 
-def plates(centres: Array, size: tuple[float, float]) -> tuple[Array, IntArray]:
+def plates(centres: Array, size: tuple[float, float]) -> Surface:
     """Level rectangles of a size about centres (N, 3) [m]: vertices (4 N, 3), faces (2 N, 3)."""
     corners = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]]) * [*size, 0.0]
     faces = np.array([[0, 1, 2], [0, 2, 3]]) + 4 * np.arange(len(centres))[:, None, None]
@@ -53,7 +54,7 @@ def ground_shape(line: Array, sides: tuple[float, float], length: float) -> tupl
     return mg.TriangularMeshGeometry(*strip(line, sides)), place
 
 
-def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, IntArray]:
+def strip(line: Array, sides: tuple[float, float]) -> Surface:
     """A surface across a line; see :func:`ground_shape`: (2 N, 3) vertices, (2 N - 2, 3) faces."""
     count, first = len(line), np.arange(len(line) - 1)
     edges = [np.insert(line, 1, y, axis=1) for y in sides]
@@ -64,7 +65,7 @@ def strip(line: Array, sides: tuple[float, float]) -> tuple[Array, IntArray]:
 
 def stripes(
     ground: Terrain, ends: tuple[float, float], side: tuple[float, float], length: float
-) -> tuple[Array, IntArray]:
+) -> Surface:
     """A line across the ground every rest ``length``, which shows that the camera travels.
 
     ``ends`` are along x, ``side`` is the middle along y and the lines' length [m].
@@ -159,20 +160,14 @@ def turned_to(direction: Array) -> Array:
 
 _FLOAT32 = 0x17  # the viewer's MessagePack extension for a Float32Array
 _FOREVER = 1_000_000
-
-
-class _Gradual(mg.TriangularMeshGeometry):
-    """A mesh whose vertices appear in their ``frame``: a dashed material draws up to its dash."""
-
-    def __init__(self, vertices: Array, faces: IntArray, frame: Array) -> None:
-        super().__init__(vertices, faces)
-        self.frame = frame
-
-    def lower(self, object_data: dict[str, Any]) -> dict[str, Any]:
-        lowered = super().lower(object_data)
-        frame = mg.pack_numpy_array(self.frame.astype(np.float32))
-        lowered["data"]["attributes"]["lineDistance"] = frame
-        return dict(lowered)
+_TYPES = {
+    "position": "vector3",
+    "quaternion": "quaternion",
+    "scale": "vector3",
+    "visible": "bool",
+    "material.dashSize": "number",
+}
+"""Of the properties that are animated."""
 
 
 class _Dashed(mg.GenericMaterial):
@@ -195,8 +190,10 @@ class _Scene:
     def _command(self, kind: str, path: str, **what: Any) -> None:
         self._commands.append({"type": kind, "path": path, **what})
 
-    def add(self, path: str, geometry: mg.Geometry, material: mg.Material) -> None:
-        self._command("set_object", path, object=mg.Mesh(geometry, material).lower())
+    def add(self, path: str, geometry: mg.Geometry, material: mg.Material) -> dict[str, Any]:
+        lowered: dict[str, Any] = mg.Mesh(geometry, material).lower()
+        self._command("set_object", path, object=lowered)
+        return lowered
 
     def place(self, path: str, matrix: Array) -> None:
         self._command("set_transform", path, matrix=matrix.T.ravel().tolist())
@@ -204,33 +201,38 @@ class _Scene:
     def set(self, path: str, name: str, value: Any) -> None:
         self._command("set_property", path, property=name, value=value)
 
-    def animate(self, path: str, name: str, kind: str, values: Array) -> None:
-        self._track(path, name, kind, self.clock, _packed(values))
+    def animate(self, path: str, **values: Array) -> None:
+        """Values of a path's properties by frame."""
+        for name, of in values.items():
+            self._track(path, name, self.clock, _packed(of))
 
     def show(self, path: str, visible: BoolArray) -> None:
         """Keys only where it changes, and at both ends: a switch is not interpolated."""
         keys = np.flatnonzero(np.diff(visible, prepend=~visible[:1]))
         keys = np.unique(np.append(keys, len(visible) - 1))
-        self._track(path, "visible", "bool", self.clock[keys], visible[keys].tolist())
+        self._track(path, "visible", self.clock[keys], visible[keys].tolist())
 
-    def _track(self, path: str, name: str, kind: str, times: Array, values: Any) -> None:
-        track = {"name": f".{name}", "type": kind, "times": _packed(times), "values": values}
-        self._tracks.setdefault(path, []).append(track)
+    def _track(self, path: str, name: str, times: Array, values: Any) -> None:
+        track = {"name": f".{name}", "type": _TYPES[name], "times": _packed(times)}
+        self._tracks.setdefault(path, []).append({**track, "values": values})
 
     def stretch(self, path: str, begin: Array, span: Array, visible: BoolArray) -> None:
         """Let what stands from 0 to 1 on the vertical reach along ``span`` from ``begin``."""
-        self.animate(path, "position", "vector3", begin)
-        self.animate(path, "quaternion", "quaternion", turned_to(span))
         size = np.insert(np.ones((len(span), 2)), 2, np.linalg.norm(span, axis=1), axis=1)
-        self.animate(path, "scale", "vector3", size)
+        self.animate(path, position=begin, quaternion=turned_to(span), scale=size)
         self.show(path, visible)
 
-    def reveal(self, path: str, mesh: _Gradual, color: str, **properties: Any) -> None:
-        """Let a mesh appear as its frames come."""
+    def reveal(
+        self, path: str, surface: Surface, frame: Array | IntArray, color: str, **look: Any
+    ) -> None:
+        """Let vertices appear, each in its ``frame``: a dashed material draws up to its dash."""
         frames = np.arange(float(len(self.clock)))
         dash = {"dashSize": 0.0, "gapSize": 10.0 * len(frames), "transparent": True}
-        self.add(path, mesh, _Dashed(_rgb(color), **dash, **properties))
-        self.animate(f"{path}/<object>", "material.dashSize", "number", frames)
+        mesh = mg.TriangularMeshGeometry(*surface)
+        shown = self.add(path, mesh, _Dashed(_rgb(color), **dash, **look))
+        distance = mg.pack_numpy_array(frame.astype(np.float32))
+        shown["geometries"][0]["data"]["attributes"]["lineDistance"] = distance
+        self.animate(f"{path}/<object>", **{"material.dashSize": frames})
 
     def finished(self) -> list[dict[str, Any]]:
         """All commands; the tracks are of one clip a path, with a frame a second."""
@@ -266,7 +268,7 @@ def _overlay(color: str) -> mg.Material:
     return mg.MeshBasicMaterial(color=_rgb(color), transparent=True, depthTest=False)
 
 
-def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
+def _ribbon(points: Array, width: float) -> Surface:
     """Two crossed strips along (N, 3) points; four blocks of N vertices."""
     steps = np.diff(points, axis=0, append=points[-1:])
     steps[-1] = points[-1] - points[-2]
@@ -277,7 +279,7 @@ def _ribbon(points: Array, width: float) -> mg.TriangularMeshGeometry:
     vertices, count = np.concatenate([points + side for side in sides]), len(points)
     a = np.arange(count - 1)[:, None] + np.array([0, 2 * count])  # each step of both strips
     faces = np.stack((a, a + count, a + 1, a + count, a + count + 1, a + 1), axis=-1)
-    return mg.TriangularMeshGeometry(vertices, faces.reshape(-1, 3))
+    return vertices, faces.reshape(-1, 3)
 
 
 def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
@@ -296,7 +298,7 @@ def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float
     material = mg.MeshBasicMaterial(color=0xB4BAC2)
     scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*lines), material)
     travel = np.stack((x, y, smoothed(record.ground, x, length) + 0.72 * length), axis=-1)
-    scene.animate("/meshcat", "position", "vector3", -travel)
+    scene.animate("/meshcat", position=-travel)
     # From afar with a narrow view: little perspective, so that lengths can be compared.
     eye = [0.7 * length, 0.45 * length, 4.0 * length]
     scene.set("/Cameras/default/rotated/<object>", "position", eye)
@@ -313,17 +315,15 @@ def _robot(scene: _Scene, playback: Playback, model: pin.Model, shapes: pin.Geom
         material = mg.MeshPhongMaterial(color=color, opacity=opacity, flatShading=True)
         scene.add(f"{path}/shape", geometry, material)
         scene.place(f"{path}/shape", place)
-        scene.animate(path, "position", "vector3", positions[:, i])
-        scene.animate(path, "quaternion", "quaternion", quaternions[:, i])
+        scene.animate(path, position=positions[:, i], quaternion=quaternions[:, i])
 
 
 def _trail(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
     com = space.com[playback.rows]
-    ribbon = _ribbon(com, 0.008 * length)
-    trail = _Gradual(ribbon.vertices, ribbon.faces, np.tile(np.arange(float(len(com))), 4))
-    scene.reveal("/meshcat/com_trail", trail, COM, depthTest=False)
+    ribbon, frame = _ribbon(com, 0.008 * length), np.tile(np.arange(len(com)), 4)
+    scene.reveal("/meshcat/com_trail", ribbon, frame, COM, depthTest=False)
     scene.add("/meshcat/com", mg.Sphere(0.025 * length), _overlay(COM))
-    scene.animate("/meshcat/com", "position", "vector3", com)
+    scene.animate("/meshcat/com", position=com)
 
 
 def _template(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
@@ -334,8 +334,8 @@ def _template(scene: _Scene, playback: Playback, space: Space, length: float) ->
     nearer = np.eye(4)
     nearer[1, 3] = -0.03 * length
     scene.place("/meshcat/template/com/dot", nearer)
-    scene.animate("/meshcat/template/com", "position", "vector3", com)
-    coil = _ribbon(raised(spring(0.03 * length)), 0.01 * length)
+    scene.animate("/meshcat/template/com", position=com)
+    coil = mg.TriangularMeshGeometry(*_ribbon(raised(spring(0.03 * length)), 0.01 * length))
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
         scene.add(path, coil, _overlay(TEMPLATE))
@@ -364,7 +364,6 @@ def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -
         if not shown.any():
             continue
         centres = places[shown] + np.array([0.0, 0.0, 0.002 * length])
-        vertices, faces = plates(centres, (0.05 * length, 0.1 * length))
-        frame = np.searchsorted(record.time[rows], since[shown]).astype(float)
-        mesh = _Gradual(vertices, faces, np.repeat(frame, 4))
-        scene.reveal(f"/meshcat/footholds/{name.removesuffix(' foot')}", mesh, color)
+        marks = plates(centres, (0.05 * length, 0.1 * length))
+        frame = np.repeat(np.searchsorted(record.time[rows], since[shown]), 4)
+        scene.reveal(f"/meshcat/footholds/{name.removesuffix(' foot')}", marks, frame, color)
