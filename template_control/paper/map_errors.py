@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,37 +18,29 @@ from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.view.style import panelled
 
+_GRID = {"stiffness": 10, "angle": 21, "speed": 12, "height": 12}  # numbers of values
 
-@dataclass(frozen=True)
-class Grid:
-    """Numbers of values over Table II's ranges, ends included.
+
+def grid_states(p: SlipParameters) -> tuple[Array, Array]:
+    """VLO states (n, 3) and controls (n, NUM_SLOTS) over Table II's ranges, ends included.
 
     k0 is from 10 to 25 kN/m, alpha from 60 to 80 degrees, dx/dt at VLO from 0.5 to 2 m/s, and y
-    strictly between l0 sin(alpha) and l0 (cell centres).
+    strictly between l0 sin(alpha) and l0 (cell centres); dy/dt is 0.
     """
-
-    stiffness: int = 10
-    angle: int = 21
-    speed: int = 12
-    height: int = 12
-
-    def states(self, parameters: SlipParameters) -> tuple[Array, Array]:
-        """VLO states (n, 3) and controls (n, NUM_SLOTS) of the grid, dy/dt = 0."""
-        share = (np.arange(self.height) + 0.5) / self.height
-        k, a, u, f = np.meshgrid(
-            np.linspace(10e3, 25e3, self.stiffness),
-            np.radians(np.linspace(60.0, 80.0, self.angle)),
-            np.linspace(0.5, 2.0, self.speed),
-            share,
-            indexing="ij",
-        )
-        lowest = parameters.rest_length * np.sin(a)
-        y = lowest + f * (parameters.rest_length - lowest)
-        z = np.stack((u, y, np.zeros_like(u)), axis=-1).reshape(-1, 3)
-        controls = np.zeros((len(z), NUM_SLOTS))
-        controls[:, Slot.TOUCHDOWN_ANGLE] = a.ravel()
-        controls[:, Slot.K_SC] = controls[:, Slot.K_SD] = k.ravel()
-        return z, controls
+    k, a, u, f = np.meshgrid(
+        np.linspace(10e3, 25e3, _GRID["stiffness"]),
+        np.radians(np.linspace(60.0, 80.0, _GRID["angle"])),
+        np.linspace(0.5, 2.0, _GRID["speed"]),
+        (np.arange(_GRID["height"]) + 0.5) / _GRID["height"],
+        indexing="ij",
+    )
+    lowest = p.rest_length * np.sin(a)
+    y = lowest + f * (p.rest_length - lowest)
+    z = np.stack((u, y, np.zeros_like(u)), axis=-1).reshape(-1, 3)
+    controls = np.zeros((len(z), NUM_SLOTS))
+    controls[:, Slot.TOUCHDOWN_ANGLE] = a.ravel()
+    controls[:, Slot.K_SC] = controls[:, Slot.K_SD] = k.ravel()
+    return z, controls
 
 
 @dataclass(frozen=True)
@@ -82,10 +74,10 @@ class ErrorStudy:
         return len(self.distance)
 
 
-def study(grid: Grid | None = None) -> ErrorStudy:
+def study() -> ErrorStudy:
     """Errors of the closed-form VLO maps where the exact step completes, with (29) and (30)."""
     p = SlipParameters()
-    z, u = (grid or Grid()).states(p)
+    z, u = grid_states(p)
     tried = len(z)
     true = ReturnMap(p, StrideKind.WALK)(z, u)
     valid = (true.outcome == Outcome.SECTION) & _may_touch_down(p, z, u)
@@ -142,21 +134,21 @@ _BINS = np.linspace(0.0, 0.5, 11)
 _NAMES = {MapKind.PAPER: "paper map", MapKind.IMPROVED: "improved", MapKind.GEYER: "Geyer"}
 
 
-def _grid_note(result: ErrorStudy, grid: Grid) -> str:
+def _grid_note(result: ErrorStudy) -> str:
+    numbers = "{stiffness} stiffnesses x {angle} angles x {speed} speeds x {height} heights"
     return (
-        f"The grid: {grid.stiffness} stiffnesses x {grid.angle} angles x {grid.speed} speeds x"
-        f" {grid.height} heights over Table II's ranges, {result.valid} of {result.tried} runs"
-        f" valid; the paper's {_PAPER_RUNS} valid runs are on a grid it does not state."
+        f"The grid: {numbers.format(**_GRID)} over Table II's ranges, {result.valid} of"
+        f" {result.tried} runs valid; the paper's {_PAPER_RUNS} valid runs are on a grid it does"
+        " not state."
     )
 
 
 def table3() -> Reproduction:
     """Table III: mean, standard deviation and maximum of (31) and (32)."""
-    grid = Grid()
-    result = study(grid)
+    result = study()
     rows = []
     data: dict[str, object] = {
-        "grid": asdict(grid),
+        "grid": _GRID,
         "tried": result.tried,
         "valid": result.valid,
         "published": _PAPER,
@@ -176,7 +168,7 @@ def table3() -> Reproduction:
         rows=rows,
         data=data,
         notes=(
-            _grid_note(result, grid),
+            _grid_note(result),
             "Position agrees with the published mean; our grid holds more slow, nearly stalling"
             " steps, whose velocity errors are large, so the paper's own map has about twice"
             " the published velocity error on it.",
@@ -188,8 +180,7 @@ def table3() -> Reproduction:
 
 def fig5() -> Reproduction:
     """Fig. 5: errors of the maps binned over d_v."""
-    grid = Grid()
-    result = study(grid)
+    result = study()
     counts, _ = np.histogram(result.distance, _BINS)
 
     def binned(errors: Array) -> Array:
@@ -212,7 +203,7 @@ def fig5() -> Reproduction:
         columns=("d_v", "runs", *(f"{e}_v {name} [%]" for e in "eE" for name in means)),
         rows=rows,
         data={
-            "grid": asdict(grid),
+            "grid": _GRID,
             "edges": _BINS.tolist(),
             "runs": counts.tolist(),
             "beyond": int(np.sum(result.distance >= _BINS[-1])),
@@ -222,7 +213,7 @@ def fig5() -> Reproduction:
             },
         },
         notes=(
-            _grid_note(result, grid),
+            _grid_note(result),
             "As in the paper: near a fixed point (small d_v), where a controller works, all"
             " maps are at their best.",
         ),

@@ -91,7 +91,6 @@ def basin_figure(
     columns = min(4, len(energies))
     figure, panels = gallery(len(energies), columns, (2.3, 0.3), sharex=True, sharey=True)
     extent = (heights[0], heights[-1], angles[0], angles[-1])
-    image = None
     for axes, energy, fall, good in zip(panels, energies, steps, converges, strict=False):
         image = axes.imshow(
             np.where(good, np.nan, fall), origin="lower", extent=extent, aspect="auto",
@@ -103,8 +102,7 @@ def basin_figure(
         axes.set_title(f"{energy:.2f} J", fontsize=9)
     figure.supxlabel("y at VLO [m]", fontsize=10)
     figure.supylabel("velocity angle, downward [deg]", fontsize=10)
-    if image is not None:
-        figure.colorbar(image, ax=figure.axes, label="steps to fall (blue: converges)")
+    figure.colorbar(image, ax=figure.axes, label="steps to fall (blue: converges)")
     return figure
 
 

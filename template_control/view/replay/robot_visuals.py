@@ -102,10 +102,8 @@ def _stick(
 
 def model_of(record: Record) -> pin.Model:
     """The robot's model, with a free flyer where nothing held it; the run carries a URDF."""
-    text = record.urdf
-    if isinstance(record, FloatingRecord):
-        return pin.buildModelFromXML(text, pin.JointModelFreeFlyer())
-    return pin.buildModelFromXML(text)
+    root = [pin.JointModelFreeFlyer()] if isinstance(record, FloatingRecord) else []
+    return pin.buildModelFromXML(record.urdf, *root)
 
 
 def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:

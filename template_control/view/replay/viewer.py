@@ -129,7 +129,5 @@ class ReplayServer:
 
 
 class _Server(ThreadingHTTPServer):
-    daemon_threads = True
-
     def handle_error(self, *_: object) -> None:
         """Nothing: a browser that goes away while it loads is no error."""

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from template_control.errors import ParameterError
-from template_control.paper.map_errors import Grid, study
+from template_control.paper.map_errors import study
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, MapKind, Outcome
 from template_control.slip.dynamics.closed_form import (
@@ -285,7 +285,7 @@ def test_momentum_changes_are_the_integrals_they_stand_for():
 
 
 def test_error_study_meets_its_targets():
-    result = study(Grid())
+    result = study()
     assert result.valid >= 5000
     improved = result.errors[MapKind.IMPROVED].statistics()
     paper = result.errors[MapKind.PAPER].statistics()
