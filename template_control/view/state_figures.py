@@ -36,8 +36,7 @@ _LOOK = Look()
 
 def _sections(record: Record) -> list[Section]:
     """The kind of each section of the run."""
-    kinds = [section_of(Event[name]) for name in record.sections]
-    return [kinds[i] for i in record.section]
+    return [section_of(Event[record.sections[i]]) for i in record.section]
 
 
 def _where(record: Record) -> str:
@@ -61,11 +60,13 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     toe = record.of_legs(record.foot)[np.arange(len(record.time)), record.rear, 0]
     target, last = record.section_target[-1], _sections(record)[-1]
     rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
-    panels: tuple[tuple[Axes, int, Array, tuple[float, float]], ...] = (
-        (upright, 1, np.zeros(len(toe)), (target[1], target[2])),
-        (forward, 0, toe, (0.0, target[0])),
+    speed, height, climb = record.section_state.T
+    panels: tuple[tuple[Axes, int, Array, tuple[Array, Array], tuple[float, float]], ...] = (
+        (upright, 1, np.zeros(len(toe)), (height, climb), (target[1], target[2])),
+        (forward, 0, toe, (np.zeros(len(speed)), speed), (0.0, target[0])),
     )
-    for axes, axis, origin, wanted in panels:
+    for axes, axis, origin, planned, wanted in panels:
+        axes.locator_params(axis="x", nbins=6)
         for position, velocity, color, style, name in (
             (record.com, record.com_velocity, COM, "-", "robot"),
             (record.template_com, record.template_velocity, TEMPLATE, "--", "template"),
@@ -84,18 +85,15 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
         )  # fmt: skip
         if not (axis or last is VLO):
             continue  # only at VLO it is known how far ahead of the foot the CoM is
-        speed, height, climb = record.section_state.T
         axes.plot(
-            *((height, climb) if axis else (np.zeros(len(rows)), speed)), "o", color=RIGHT,
-            fillstyle="none", markersize=4, zorder=4, label="state used by the planner",
+            *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
+            label="state used by the planner",
         )  # fmt: skip
         label = f"{in_words(last.name)} of the gait"
         axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=label)
     up = upward(record)
     upright.set(xlabel=f"{up} [m]", ylabel=f"d{up}/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
-    for axes in (upright, forward):
-        axes.locator_params(axis="x", nbins=6)
     title = f"{as_text(record.robot_name)}: phase portrait"
     return finish(figure, (upright, forward), title, look)
 
