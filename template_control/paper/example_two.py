@@ -281,7 +281,7 @@ def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Repr
         done = counted(pool.map(partial(_walk, steps=steps), cases), len(cases), "walks")
         walks = dict(zip(cases, done, strict=True))
     _, record = robot_walk("LQR", "PyBullet", steps=6)
-    sticks = stick_diagram(record, Look(0.0, 2.199, titled=False))
+    sticks = stick_diagram(record, Look(0.0, 2.199, titled=False))  # the samples before 2.2 s
     sticks.axes[0].set_title("five-link from z_0: LQR, PyBullet")
     gait = _gait()
     target = sections(gait, gait.vlo[None])[0]
