@@ -5,7 +5,8 @@ the time the template still needs to get there: a foothold or a touchdown time t
 step in the reference. The foot rises to its clearance early, keeps it while it travels, and comes
 down late, so that unknown ground is met from above. One that meets a wall all the same goes up
 along it. A high foot rises and comes down faster, and the rest of the robot moves by as much as the
-leg is heavy: only light legs swing high.
+leg is heavy: only light legs swing high. One that comes down and is due later than it was brakes
+first.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.compiled import compiled
+from template_control.compiled import compiled, inner
 from template_control.robot.biped import Biped
 from template_control.robot.terms import MOST_CONTACTS, UP, onward
 from template_control.slip.automaton.vocabulary import Reset
@@ -92,15 +93,15 @@ FEET = np.dtype(
 """Roles and swings of the feet; the references themselves are among those of the tasks."""
 
 
-@compiled
-def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
-    """Advance (position, velocity, acceleration) by ``dt`` [s] along the quintic to its target.
+_SAMPLES = 16  # of a descent, between which it does not dip below its end by much
 
-    ``target`` and ``speed`` are those at the quintic's end, ``time`` [s] from now; the acceleration
-    there is 0.
-    """
+
+@inner
+def _coefficients(
+    state: Array, target: float, speed: float, time: float
+) -> tuple[float, float, float, float, float]:
+    """c1 to c5 of a quintic p + c1 s + ... + c5 s^5 in s = t / T, from a state to its target."""
     p, v, a = state[0], state[1], state[2]
-    # In tau = t / time: c0..c5 with c0 = p, c1 = v T, c2 = a T^2 / 2.
     c1, c2 = v * time, 0.5 * a * time * time
     d = target - p - c1 - c2
     e = speed * time - c1 - 2.0 * c2
@@ -108,10 +109,35 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
     c3 = 10.0 * d - 4.0 * e + 0.5 * f
     c4 = -15.0 * d + 7.0 * e - f
     c5 = 6.0 * d - 3.0 * e + 0.5 * f
+    return c1, c2, c3, c4, c5
+
+
+@compiled
+def quintic_step(state: Array, target: float, speed: float, time: float, dt: float) -> None:
+    """Advance (position, velocity, acceleration) by ``dt`` [s] along the quintic to its target.
+
+    ``target`` and ``speed`` are those at the quintic's end, ``time`` [s] from now; the acceleration
+    there is 0.
+    """
+    p = state[0]
+    c1, c2, c3, c4, c5 = _coefficients(state, target, speed, time)
     s = dt / time
     state[0] = p + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5))))
     state[1] = (c1 + s * (2 * c2 + s * (3 * c3 + s * (4 * c4 + s * 5 * c5)))) / time
     state[2] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / time**2
+
+
+@compiled
+def _arrives_early(state: Array, target: float, speed: float, time: float) -> bool:
+    """True if a quintic from above its target, which moves down, comes below it before its end."""
+    if not (state[0] > target and state[1] < 0.0):
+        return False
+    c1, c2, c3, c4, c5 = _coefficients(state, target, speed, time)
+    for i in range(1, _SAMPLES):
+        s = i / _SAMPLES
+        if state[0] + s * (c1 + s * (c2 + s * (c3 + s * (c4 + s * c5)))) < target:
+            return True
+    return False
 
 
 @compiled
@@ -143,6 +169,10 @@ def swing_step(
     elif to_go > f.descent[foot]:
         # Up: stay there, and come to rest where the rise was cut short.
         quintic_step(y, top, 0.0, max(2.0 * horizon, dt), dt)
+    elif _arrives_early(y, ground, -landing_speed, to_go):
+        # It was to land sooner: brake half-way down to the ground, and come down from there.
+        slow = max((ground - y[0]) / y[1], horizon)
+        quintic_step(y, y[0] + 0.5 * y[1] * slow, 0.0, slow, dt)
     else:
         quintic_step(y, ground, -landing_speed, to_go, dt)
 

@@ -119,6 +119,21 @@ def test_swing_clears_the_ground_and_lands_slowly():
     assert max(accelerations) < 80.0
 
 
+@pytest.mark.parametrize("begun", [0.32, 0.35, 0.37])
+def test_a_foot_that_is_due_later_does_not_come_down_sooner(begun):
+    """A descent was planned for what was left of 0.4 s, and has 0.3 s more from ``begun`` on."""
+    options = SwingOptions(rise=0.3)
+    swing, soonest, strongest = Swing(options, np.zeros(2), np.zeros(2)), 0.0, 0.0
+    for time in np.arange(0.0, 0.7, 1e-3):
+        left = (0.4 if time < begun else 0.7) - time
+        swing.advance(0.6, left)
+        strongest = max(strongest, abs(swing.y[2]))
+        if swing.y[0] <= 0.0 and not soonest:
+            soonest = left
+    assert soonest < options.horizon
+    assert strongest < 40.0
+
+
 def test_swing_without_a_foothold_comes_down():
     swing = Swing(SwingOptions(), np.array([0.0, 0.05]), np.array([1.0, 0.0]))
     for _ in range(100):
