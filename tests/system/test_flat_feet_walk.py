@@ -74,7 +74,7 @@ def test_g1_walks_and_is_recorded(tmp_path):
     assert record.plot("stick_diagram").axes
     tc.save_html(record, tmp_path / "replay.html")
     stage = Stage(playback(record, fps=2.0))
-    trunk = stage.seen(stage.body.trunk())[:, 1]
+    trunk = stage.seen(stage.corners.reshape(-1, 3))[:, 1]
     low, high = stage.figure.axes[0].get_ylim()
     assert low < trunk.min() < trunk.max() < high, "its trunk is in the film"
 

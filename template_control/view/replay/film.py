@@ -51,14 +51,14 @@ class Stage:
     """The picture of a run, whose artists each frame moves.
 
     ``camera`` (2, 3) leads from the world to the picture; ``legs`` are the lines of each, through
-    its ``joints`` (F, n, joints, 3) [m].
+    its ``joints`` (F, n, joints, 3), ``corners`` (F, 4, 3) those of the trunk [m].
     """
 
     def __init__(self, playback: Playback) -> None:
         record = playback.record
         self.playback, self._space = playback, in_space(record, np.zeros(len(record.feet)))
         self._stood = stood(record, self._space)
-        self.joints, self._corners, on_left = _bodies(record, playback.rows)
+        self.joints, self.corners, on_left = _bodies(record, playback.rows)
         self._length = length = record.template.rest_length
         flat = not isinstance(record, FloatingRecord)
         self.camera = FROM_THE_SIDE if flat else IN_SPACE
@@ -70,7 +70,7 @@ class Stage:
         axes.set_aspect("equal", adjustable="box")
         self._draw_ground(flat)
         self._level = smoothed(record.ground, self._space.com[playback.rows, 0], length)
-        tall = float(self._corners[0, :, 2].max() - self._level[0]) * self.camera[1, 2]
+        tall = float(self.corners[0, :, 2].max() - self._level[0]) * self.camera[1, 2]
         high = max(_FLATTER * _WIDTH * length, _OVER * tall / (1.0 - self._below))
         self._size = high / _FLATTER, high
 
@@ -141,7 +141,7 @@ class Stage:
         record, space, rows = self.playback.record, self._space, self.playback.rows
         row, seen = rows[frame], self.seen
         com, feet = space.com[row], space.foot[row]
-        self._trunk.set_xy(seen(self._corners[frame]))
+        self._trunk.set_xy(seen(self.corners[frame]))
         for foot, leg in enumerate(self.legs):
             leg.set_data(*seen(np.vstack((self.joints[frame, foot], feet[foot]))).T)
             places, since = self._stood[foot]
