@@ -316,8 +316,7 @@ class SoleRecord(FloatingRecord):
         In the air is a foot that bears less than a hundredth of the weight.
         """
         fz = self.sole_wrench[:, :, 2]
-        least = 0.01 * float(self.metadata["mass"]) * 9.81
-        load = np.where(fz > least, fz, np.nan)[:, :, None]
+        load = np.where(fz > 0.01 * self.weight, fz, np.nan)[:, :, None]
         return self.sole_wrench[:, :, [4, 3]] * (-1.0, 1.0) / load
 
 
