@@ -314,8 +314,8 @@ _COMPOUND: dict[Any, Callable[..., Any]] = {
 
 def _instance(value: Any, kind: type) -> Any:
     if getattr(kind, "_is_protocol", False):
-        missing = [name for name in _members(kind) if not _has(value, name)]
-        if isinstance(value, type) or 2 * len(missing) > len(_members(kind)) + 1:
+        missing = [name for name in members(kind) if not _has(value, name)]
+        if isinstance(value, type) or 2 * len(missing) > len(members(kind)) + 1:
             raise Refused(words_for(kind))
         if missing:  # meant as one, as it seems
             base = inspect.isabstract(kind) and kind not in type(value).__mro__
@@ -332,7 +332,7 @@ def _has(value: Any, name: str) -> bool:
 
 
 @cache
-def _members(kind: type) -> tuple[str, ...]:
+def members(kind: type) -> tuple[str, ...]:
     """Names that a protocol asks for."""
     names = [
         name

@@ -12,6 +12,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from template_control.checks.checked import Checked
+from template_control.checks.fitting import members
 from template_control.checks.ranges import Degrees, Positive, Speed
 from template_control.embedding.planners.ahead import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
@@ -105,9 +106,6 @@ class GaitSpec(Checked):
         return (SOLE_RUN if robot.patches else _RUN) * template_for(robot).speed_unit
 
 
-_PLANNER_MEMBERS = ("gait", "offset", "reset", "decide", "observe")
-
-
 @dataclass(frozen=True)
 class OwnPlanner(Checked):
     """A planner of the user's own.
@@ -153,9 +151,9 @@ class OwnPlanner(Checked):
             raise ParameterError(f"planner {self.path!r} must take a gait alone: {error}") from None
         made = chosen(gait)
         if not isinstance(made, Planner):
-            lacking = [n for n in _PLANNER_MEMBERS if not hasattr(made, n)]
+            lacking = [n for n in members(Planner) if not hasattr(made, n)]
             raise ParameterError(
-                f"planner {self.path!r} lacks {', '.join(lacking)}: see docs/guides/your_planner.md"
+                f"planner {self.path!r} lacks {', '.join(lacking)}: derive it from Planner"
             )
         return made
 

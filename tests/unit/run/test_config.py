@@ -227,6 +227,10 @@ class Half:
 
     def reset(self):
         pass
+
+
+class Nearly(Half):
+    offset = decide = observe = None
 """
 
 
@@ -251,7 +255,10 @@ def test_a_planner_of_ones_own_walks_and_is_written_down(own_planner, tmp_path):
 
 def test_what_a_planner_lacks_is_told(own_planner, refused):
     line = refused(["walk", "--planner", f"{own_planner}:Half"])
-    assert f"{own_planner}:Half' lacks offset, decide, observe" in line
+    assert f"{own_planner}:Half' lacks offset, retries, decide, decide_rest" in line
+    line = refused(["walk", "--planner", f"{own_planner}:Nearly"])
+    assert f"{own_planner}:Nearly' lacks retries, decide_rest, forget" in line
+    assert "derive it from Planner" in line
     line = refused(["walk", "--planner", f"{own_planner}:Bare"])
     assert (
         f"{own_planner}:Bare' must take a gait alone: missing a required argument: 'sign'" in line
