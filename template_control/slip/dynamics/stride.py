@@ -110,7 +110,8 @@ def chained(*strides: Stride) -> Stride:
     row, start = 0, 0.0
     for stride in strides:
         meta[row : row + len(stride.meta), 0] += start
-        events += (event._replace(time=start + event.time) for event in stride.events)
+        fired = stride.events
+        events += [FiredEvent(start + e[0], *e[1:]) for e in fired] if row else fired
         row, start = row + len(stride.meta), start + stride.duration
     return replace(
         strides[-1],
