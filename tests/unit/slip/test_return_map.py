@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
@@ -139,8 +139,9 @@ def test_tangents_are_what_differences_tend_to(stride):
         np.testing.assert_allclose(jacobian[:, j] * size, expected, atol=2e-9, rtol=2e-9)
 
 
-@settings(max_examples=50)
+@settings(max_examples=50, deadline=None)  # the first example loads what is compiled
 @given(z=walking, alpha=st.floats(64.0, 68.0))
+@example(z=(0.953125, 0.9674171601112809, 0.0), alpha=66.9375)  # dE(z') J by dy/dt nearly 0
 def test_tangents_keep_energy(z, alpha):
     """With springs that do not change, E(z') = E(z): dE(z') J is dE(z) by z, and 0 by alpha."""
     step, u = ReturnMap(P, "w"), controls(np.radians(alpha), K0, K0)
@@ -159,6 +160,9 @@ def test_tangents_keep_energy(z, alpha):
 
     kept = slope(end) @ jacobian[:3]
     scale = np.abs(slope(end)) @ np.abs(jacobian[:3])
+    # A column that nearly vanishes is rounded like others: half the energy over its unit counts.
+    units = np.array([P.speed_unit, P.rest_length, P.speed_unit, 1.0])
+    scale = np.maximum(scale, 0.5 * P.mass * P.gravity * P.rest_length / units)
     # The map keeps energy to its series' 1e-13; by the state it varies a thousand times as much.
     np.testing.assert_array_less(np.abs(kept - [*slope(z), 0.0]), 1e-9 * scale)
 
