@@ -88,7 +88,7 @@ def apex_pose(
         dt = (apex * period - now) / ticks
         for _ in range(ticks):
             foothold = toe + 2.0 * gait.step_length, 0.0, due - now
-            swing_step(swing[0], 0, *reference, foothold, dt)
+            swing_step(swing[0], 0, *reference, foothold, True, dt)
             now += dt
         (x, speed, _), (y, rise, _) = reference.tolist()
         feet.append([x - apex * gait.step_length, y])

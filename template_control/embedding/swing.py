@@ -20,7 +20,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.compiled import compiled, inner
+from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.robot.terms import MOST_CONTACTS, UP, onward
 from template_control.slip.automaton.vocabulary import Reset
@@ -93,10 +93,7 @@ FEET = np.dtype(
 """Roles and swings of the feet; the references themselves are among those of the tasks."""
 
 
-_SAMPLES = 16  # of a descent, between which it does not dip below its end by much
-
-
-@inner
+@compiled
 def _coefficients(
     state: Array, target: float, speed: float, time: float
 ) -> tuple[float, float, float, float, float]:
@@ -127,6 +124,9 @@ def quintic_step(state: Array, target: float, speed: float, time: float, dt: flo
     state[2] = (2 * c2 + s * (6 * c3 + s * (12 * c4 + s * 20 * c5))) / time**2
 
 
+_SAMPLES = 16  # of a descent, between which it does not dip below its end by much
+
+
 @compiled
 def _arrives_early(state: Array, target: float, speed: float, time: float) -> bool:
     """True if a quintic from above its target, which moves down, comes below it before its end."""
@@ -142,12 +142,19 @@ def _arrives_early(state: Array, target: float, speed: float, time: float) -> bo
 
 @compiled
 def swing_step(
-    f: Any, foot: int, x: Array, y: Array, foothold: tuple[float, float, float], dt: float
+    f: Any,
+    foot: int,
+    x: Array,
+    y: Array,
+    foothold: tuple[float, float, float],
+    foreseen: bool,
+    dt: float,
 ) -> None:
     """Advance a foot's reference by ``dt`` [s] towards its foothold.
 
     ``f`` is of ``FEET``; ``x``, ``y`` (3,) are position, velocity, acceleration [m, m/s, m/s^2];
-    ``foothold`` is its x and y [m], and the time until the foot is due there [s].
+    ``foothold`` is its x and y [m], and the time until the foot is due there [s]. Where the
+    template lands there, that is ``foreseen``; no foot brakes for a guess.
     """
     place, ground, to_go = foothold
     horizon, landing_speed, elapsed = f.horizon[foot], f.landing_speed[foot], f.elapsed[foot]
@@ -169,7 +176,7 @@ def swing_step(
     elif to_go > f.descent[foot]:
         # Up: stay there, and come to rest where the rise was cut short.
         quintic_step(y, top, 0.0, max(2.0 * horizon, dt), dt)
-    elif _arrives_early(y, ground, -landing_speed, to_go):
+    elif foreseen and _arrives_early(y, ground, -landing_speed, to_go):
         # It was to land sooner: brake half-way down to the ground, and come down from there.
         slow = max((ground - y[0]) / y[1], horizon)
         quintic_step(y, y[0] + 0.5 * y[1] * slow, 0.0, slow, dt)

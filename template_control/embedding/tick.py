@@ -266,7 +266,8 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
         elif foot == overdue:
             drop(f, foot, x, y, dt)
         else:
-            if not np.isfinite(foothold):
+            foreseen = np.isfinite(foothold)
+            if not foreseen:
                 # The template cannot complete the stride; the gait's own foothold is the best
                 # guess.
                 foothold = t.sensed.toes[_REAR] + path.step_length
@@ -274,7 +275,7 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
             if mode.rolling_contact:
                 foothold = rolled(foothold, path.touchdown_angle, r.foot_radius)
             wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
-            swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), dt)
+            swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), foreseen, dt)
         hip = (r.hips[0] + onward(r.facing) * r.toe_ahead, r.hips[UP] - r.ankle_height)
         sideways = 0.0
         if np.isfinite(r.leg_lean):

@@ -38,12 +38,11 @@ def check(record, top):
     assert (record.fall_reason, record.arrived) == ("", True)
     kinds = record.kinds_of_stride[:-1]
     order = [kind for i, kind in enumerate(kinds) if i == 0 or kind != kinds[i - 1]]
-    assert order[:7] == ["s", "sw", "ww", "w", "wr", "r", "rw"]
+    assert order[:8] == ["s", "sw", "ww", "w", "wr", "r", "rw", "w"]
     assert order[-2:] == ["sf", "s"]
-    # It leaves the run at 1.1 or 1.4 m/s, by where its apexes fall, and comes to its walk and slows
-    # down in as many steps as it takes; from the slowest it closes its feet at once.
+    # It slows down in as many steps as it takes; from the slowest it closes its feet at once.
     assert order[-3] in ("ws", "ww")
-    assert set(order[7:-3]) == {"ww", "w"}
+    assert set(order[8:-3]) <= {"ww", "w"}
     speed = record.section_state[:, 0]
     assert speed.max() == pytest.approx(top, abs=0.05)
     error = speed[1:] - record.section_target[:-1, 0]

@@ -36,8 +36,9 @@ class Swing:
         begin_swing(self.data, 0, options, self.reference, position, velocity, elapsed)
         self.x, self.y = self.reference
 
-    def advance(self, foothold, due):
-        swing_step(self.data[0], 0, self.x, self.y, (foothold, 0.0, due), 1e-3)
+    def advance(self, foothold, due, foreseen=True):
+        aim = foothold, 0.0, due
+        swing_step(self.data[0], 0, self.x, self.y, aim, foreseen, 1e-3)
 
 
 def meet(swing, at, foothold, due):
@@ -132,6 +133,16 @@ def test_a_foot_that_is_due_later_does_not_come_down_sooner(begun):
             soonest = left
     assert soonest < options.horizon
     assert strongest < 40.0
+
+
+@pytest.mark.parametrize(("foreseen", "brakes"), [(True, True), (False, False)])
+def test_no_foot_brakes_for_a_guess(foreseen, brakes):
+    """Nearly on the ground; by the gait alone, it would land 0.13 s from now."""
+    swing = Swing(SwingOptions(), np.array([0.6, 0.011]), np.array([0.0, -0.6]), elapsed=0.27)
+    quintic = swing.y.copy()
+    quintic_step(quintic, 0.0, -SwingOptions().landing_speed, 0.13, 1e-3)
+    swing.advance(0.6, 0.13, foreseen)
+    assert np.array_equal(swing.y, quintic) != brakes
 
 
 def test_swing_without_a_foothold_comes_down():
