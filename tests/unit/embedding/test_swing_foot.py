@@ -135,6 +135,23 @@ def test_a_foot_that_is_due_later_does_not_come_down_sooner(begun):
     assert strongest < 40.0
 
 
+@pytest.mark.parametrize("shape", [SwingOptions(), HIGH_SWING, SLOW_SWING])
+@pytest.mark.parametrize(
+    ("first", "begun", "more"), [(0.5, 0.44, 0.5), (0.4, 0.34, 0.4), (0.25, 0.2, 0.25)]
+)
+def test_no_foot_is_flung_up_where_its_touchdown_is_put_off(shape, first, begun, more):
+    """Of 0.5 s in all, say, 0.44 are over when they become 0.94: 0.03 s are left to rise in."""
+    swing, heights, soonest = Swing(shape, np.zeros(2), np.zeros(2)), [], 0.0
+    for time in np.arange(0.0, begun + more, 1e-3):
+        left = (first if time < begun else begun + more) - time
+        swing.advance(0.6, left)
+        heights.append(swing.y[0])
+        if swing.y[0] <= 0.0 and not soonest:
+            soonest = left
+    assert max(heights) < 0.1
+    assert soonest < 1.5 * shape.horizon
+
+
 @pytest.mark.parametrize(("foreseen", "brakes"), [(True, True), (False, False)])
 def test_no_foot_brakes_for_a_guess(foreseen, brakes):
     """Nearly on the ground; by the gait alone, it would land 0.13 s from now."""
