@@ -131,8 +131,10 @@ def _add_planar(ground: Element, robot: Biped, world: PlantOptions) -> dict[int,
         for above in chain:
             here = here * data.liMi[above]
             ref, hinge = float(neutral[above - 1]), above - 1 - PLANAR_DOF
-            lost = _losses(robot, hinge, world.time_step) if hinge >= 0 else {}
-            _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, lost=lost)
+            own = (
+                _stops(model, above) | _losses(robot, hinge, world.time_step) if hinge >= 0 else {}
+            )
+            _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, own=own)
         # The robot turns about the axis of its hinges only, where any rotation leaves the inertia
         # as it is. MuJoCo refuses the flat inertias of a planar model, whose other two axes have
         # none.
@@ -157,7 +159,7 @@ def _add_floating(ground: Element, robot: Biped, world: PlantOptions) -> dict[in
         else:
             axis = data.oMi[joint].rotation.T @ axes[3:, model.idx_vs[joint]]
             about = {"axis": _text(axis), "ref": repr(float(neutral[model.idx_qs[joint]]))}
-            about |= _losses(robot, joint - 1 - _ROOT, world.time_step)
+            about |= _stops(model, joint) | _losses(robot, joint - 1 - _ROOT, world.time_step)
             _add(body, "joint", name=model.names[joint], type="hinge", **about)
         i = world.mass_scale * model.inertias[joint].inertia
         moments = _text((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
@@ -191,7 +193,7 @@ def _add_joint(
     axis: Array,
     *,
     ref: float,
-    lost: dict[str, str],
+    own: dict[str, str],
 ) -> None:
     """A joint of a body; ``here`` is its frame in the body's where its angle is ``ref``."""
     hinge = bool(np.any(axis[3:]))
@@ -202,10 +204,14 @@ def _add_joint(
         "pos": _text(here.translation),
         "ref": repr(ref),
     }
-    low, high = model.lowerPositionLimit[joint - 1], model.upperPositionLimit[joint - 1]
-    if joint > PLANAR_DOF and max(abs(low), abs(high)) < UNLIMITED:
-        about["range"] = _text((low, high))
-    _add(body, "joint", **about, **lost)
+    _add(body, "joint", **about, **own)
+
+
+def _stops(model: pin.Model, joint: int) -> dict[str, str]:
+    """Attributes of a joint that has stops."""
+    place = model.idx_qs[joint]
+    stops = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+    return {"range": _text(stops)} if np.abs(stops).max() < UNLIMITED else {}
 
 
 def _losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:

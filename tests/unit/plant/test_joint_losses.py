@@ -53,11 +53,11 @@ def test_damping_is_the_same_in_every_engine_in_space(written, damping, engine):
 
 
 def slid(robot, plant, torque, speed=0.0, duration=0.05):
-    """Speeds (nu,) of the joints of a robot in the air, after so long under a torque."""
+    """Speeds (nu,) of the joints of a robot in the air, off their stops, after a torque."""
     nu = len(robot.joint_names)
     q, v = robot.neutral(), np.zeros(robot.nv)
     q[1 if robot.base_dof == 3 else 2] = 5.0
-    q[-nu:], v[-nu:] = 0.6, speed
+    q[-nu:], v[-nu:] = np.clip(0.6, *0.8 * robot.joint_range.T), speed
     with plant as world:
         world.reset(q, v)
         for _ in range(round(duration / DT)):

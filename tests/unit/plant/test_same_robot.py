@@ -134,6 +134,27 @@ def test_a_push_acts_on_the_whole_trunk(written, kind):
     np.testing.assert_allclose(ends[1:], [ends[0]] * 2, atol=2e-3)
 
 
+@pytest.mark.parametrize("engine", FREE)
+@pytest.mark.parametrize("floats", [False, True])
+@pytest.mark.parametrize("way", [-1.0, 1.0])
+def test_no_knee_goes_through_its_stops(engine, floats, way):
+    """In free fall, with a fiftieth of the torque that it can have; MuJoCo's give by 0.13 rad."""
+    robot = load_floating_robot("five-link-3d") if floats else load_robot("five-link")
+    plant, options = (FREE if floats else PLANAR)[engine]
+    knee = robot.joint_names.index("left_knee")
+    q, v, torque = robot.neutral(), np.zeros(robot.nv), np.zeros(len(robot.joint_names))
+    q[2 if floats else 1] = 5.0
+    q[knee - len(torque)], torque[knee] = 1.2, 0.02 * way * robot.torque_limit[knee]
+    stop, angles = robot.joint_range[knee, 0 if way < 0.0 else 1], []
+    with plant(robot, options()) as world:
+        world.reset(q, v)
+        for _ in range(1000):
+            world.step(torque)
+            world.read(q, v)
+            angles.append(way * (q[knee - len(torque)] - stop))
+    assert -0.01 < max(angles) < 0.15
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_masses_and_centre_are_those_of_the_file(written, kind):
     made = FloatingBaseBiped.from_urdf(written(KINDS[kind]))
