@@ -8,11 +8,12 @@ import numpy as np
 
 from template_control.arrays import BoolArray, IntArray
 from template_control.run.record import FloatingRecord, Record
+from template_control.run.statistics import AT_LIMIT
 from template_control.slip.similarity import Scale
 
 _LOOKED_AT = 4  # strides before the fall
 _LATE = 1.3  # step durations of the gait, after which a stride is late
-_LIMIT, _AT_LIMIT = 0.999, 0.02  # share of the torque limit; how long, on the reference [s]
+_LONG = 0.02  # time that a torque is at its limit on end, on the reference [s]
 _SLIP = 0.02  # of l0, that a foot slides since it bears
 _BEARS = 0.05  # share of the weight that a foot bears when it stands
 _STRAIGHT = 0.998  # of the leg's length, that a knee is straight from on
@@ -46,9 +47,9 @@ def _bears(record: Record) -> BoolArray:
 
 
 def _limited(record: Record) -> BoolArray:
-    at_limit = np.abs(record.torque) >= _LIMIT * record.torque_limit
+    at_limit = np.abs(record.torque) >= AT_LIMIT * record.torque_limit
     lasts = record.time[:, None] - record.time[_began(at_limit)]
-    long = lasts >= _AT_LIMIT * Scale.of(record.template).time
+    long = lasts >= _LONG * Scale.of(record.template).time
     return np.asarray((at_limit & long).any(axis=1))
 
 

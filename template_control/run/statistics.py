@@ -12,7 +12,8 @@ from template_control import settings
 from template_control.arrays import Array, IntArray
 from template_control.robot.biped import Biped
 
-_AT_LIMIT = 0.999  # of a torque's limit: the solver comes no nearer
+AT_LIMIT = 0.999
+"""Share of its limit from which on a torque is at it: the solver comes no nearer."""
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ def count(block: Mapping[str, Array], torque_limit: Array) -> Counts:
         least=angle.min(axis=0, initial=np.inf),
         most=angle.max(axis=0, initial=-np.inf),
         work=float(np.abs(torque * speed).sum(axis=1) @ block["interval"]),
-        saturated=int((size >= _AT_LIMIT * torque_limit).any(axis=1).sum()),
+        saturated=int((size >= AT_LIMIT * torque_limit).any(axis=1).sum()),
         failures=int((block["solved"] == 0.0).sum()),
         ticks=np.array([len(some) for some in sorts]),
         error=np.array([np.abs(some).max(axis=0, initial=0.0) for some in sorts]),

@@ -177,7 +177,8 @@ def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
     time, last = record.time, float(record.time[-1])
     pushed = np.flatnonzero(record.push)
     changes = [i for i, (a, b) in enumerate(pairwise(record.kinds_of_stride), 1) if a != b]
-    uneven = np.flatnonzero(np.diff([record.ground.height_at(x) for x in record.com[::50, 0]]))
+    height = record.ground.height_at
+    uneven = np.flatnonzero(np.diff([height(x) for x in record.com[::50, 0]]))
     middle = last
     if record.fell:
         pass
