@@ -19,6 +19,7 @@ def printed(tmp_path, capfd):
     return run
 
 
+@pytest.mark.slow(seconds=1)
 def test_keys_of_a_run(printed, tmp_path):
     walk = printed(f"{WALK} --output {tmp_path}")
     free = printed(f"{WALK} --steps 2 --robot bolt --floating-base --output {tmp_path}")

@@ -113,6 +113,7 @@ def test_the_hip_is_measured_from_the_ground_below_it(robot, gait, monkeypatch):
     assert record.q[-2, 0] <= 1.0 < record.q[-1, 0]
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_stick_diagram_draws_the_step(on_step, short_walk, tmp_path):
     step, record = on_step(0.005)
     record = Record.load(record.save(tmp_path / "run.npz"))

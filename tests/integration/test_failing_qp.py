@@ -26,6 +26,7 @@ def _weak(scale):
     return tc.Experiment(steps=10, controller=controller, world=tc.PlantOptions())
 
 
+@pytest.mark.slow(seconds=1)
 @pytest.mark.parametrize(("scale", "fails"), [(0.05, True), (1.0, False)])
 def test_a_run_in_which_the_qp_fails_says_so_at_once(robot, default_gait, caplog, scale, fails):
     options = _weak(scale)

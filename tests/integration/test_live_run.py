@@ -39,6 +39,7 @@ def repeats(record, experiment, tmp_path):
         np.testing.assert_array_equal(getattr(again, name)[first : first + len(values)], values)
 
 
+@pytest.mark.slow(seconds=1)
 @pytest.mark.parametrize("plant", PLANTS)
 def test_what_is_done_by_hand_is_repeated_to_the_last_bit(plant, tmp_path):
     experiment = tc.Experiment("five-link", tc.run.VelocityCommand(0.6), world=PLANTS[plant])
@@ -99,6 +100,7 @@ def test_friction_changes_while_a_run_goes_on():
         assert np.any(along[~slides] > 0.05 * vertical[~slides])
 
 
+@pytest.mark.slow(seconds=1)
 def test_only_the_end_is_kept_of_a_long_run():
     command = tc.run.VelocityCommand(0.6)
     record, _, recorder = by_hand(tc.Experiment("five-link", command), {}, 3999, keep=1.0)

@@ -229,6 +229,7 @@ def test_a_table_that_does_not_fit_the_automaton_is_refused():
     assert "'SS_sc^hpo', which is no node" in refused({**PHASES, "SS_sc^hpo": PHASES[Phase.SS]})
 
 
+@pytest.mark.slow(seconds=3)
 @pytest.mark.parametrize(
     "world", [PlantOptions(), MujocoOptions(), IdealOptions()], ids=lambda o: o.kind
 )

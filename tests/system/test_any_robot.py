@@ -262,6 +262,7 @@ def test_links_without_mass_are_refused():
 # -- commands -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow(seconds=1)
 def test_robots_command_lists_them(capsys):
     assert main(["robots", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)

@@ -49,6 +49,7 @@ def test_a_stranger_for_every_parameter(tmp_path):
     assert not missed, missed
 
 
+@pytest.mark.slow(seconds=1)
 @given(data=st.data())
 @settings(SHARE, max_examples=100)
 def test_junk_for_public_functions(tmp_path_factory, data):
@@ -90,6 +91,7 @@ def place(tmp_path_factory):
         yield folder, kept
 
 
+@pytest.mark.slow(seconds=1)
 @given(data=st.data())
 @settings(SHARE, max_examples=40)
 def test_junk_for_commands(place, data):

@@ -130,6 +130,7 @@ def test_a_worker_that_dies_at_an_interrupt_leaves_no_traceback(monkeypatch):
     assert not broken
 
 
+@pytest.mark.slow(seconds=2)
 def test_workers_end_with_their_parent_once_a_compiled_call_returns():
     code = """
 import os

@@ -91,6 +91,7 @@ def test_where_the_package_is_read_only_the_cache_is_the_users(package, tmp_path
     assert home in path.parents
 
 
+@pytest.mark.slow(seconds=1)
 def test_where_nothing_is_writable_functions_work_without_a_cache(package, tmp_path):
     blocked = tmp_path / "blocked"
     blocked.write_text("a file: no folder can be made here")

@@ -168,6 +168,7 @@ def test_a_table_is_printed_whatever_becomes_of_the_files(tmp_path, capfd, words
     assert contents(tmp_path) == before
 
 
+@pytest.mark.slow(seconds=1)
 @pytest.mark.parametrize("words", [["automaton", "--no-figure"], ["--help"]])
 @pytest.mark.parametrize("device", ["/dev/full", "closed", "pipe"])
 def test_output_that_takes_nothing_is_one_line(command, words, device):

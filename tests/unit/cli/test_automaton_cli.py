@@ -117,6 +117,7 @@ def label_of(automaton, edge, name):
     return edge_label(edge) + (f"\nto {mathtext(edge.target)}" if leaves else "")
 
 
+@pytest.mark.slow(seconds=1)
 def test_json_is_all_there_is_on_stdout_and_equals_the_data(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "template_control.cli.main", "automaton", "--json", "--no-figure"],

@@ -248,6 +248,7 @@ SIMPLE = sorted(
 """Keys that any default experiment has or another kind of its tables, with a default."""
 
 
+@pytest.mark.slow(seconds=2)
 @given(st.sets(st.sampled_from(SIMPLE), max_size=8), st.sampled_from(["five-link", "bolt"]))
 @settings_of_hypothesis(max_examples=40, deadline=None, derandomize=True)
 def test_any_keys_together_are_options_that_their_file_holds(tmp_path_factory, paths, model):

@@ -143,6 +143,7 @@ def test_entries_are_read_as_declared():
             entries("--x", [text], "KEY=VALUE")
 
 
+@pytest.mark.slow(seconds=1)
 @pytest.mark.parametrize(
     "make",
     [

@@ -33,6 +33,7 @@ def test_the_template_ends_where_the_decision_says(default_gait, angles):
     assert np.abs(decision.predicted - plain.predicted).max() > 1e-3
 
 
+@pytest.mark.slow(seconds=1)
 def test_a_residual_is_not_learnt_as_the_robot_s_offset(default_gait):
     offsets = []
     for residual in (0.0, 0.015):

@@ -106,6 +106,7 @@ def test_they_scale_with_the_template():
         np.testing.assert_allclose(ours.stiffness, theirs.stiffness / 2.4)
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(change_search, "SPEEDS", (0.8, 0.9, 1.0))
     monkeypatch.setattr(change_search, "_TRIES", 3)

@@ -14,6 +14,7 @@ def enclosed(points):
     return (np.abs(off) <= HALF + 1e-9).all(axis=2).any(axis=1)
 
 
+@pytest.mark.slow(seconds=1)
 @pytest.mark.parametrize("seed", range(6))
 def test_the_pressure_leads_the_capture_point_back(seed):
     """Straight to the middle where both feet enclose it, else from as near as they reach."""

@@ -100,6 +100,7 @@ def test_the_imu_alone_carries_a_robot_that_is_thrown_and_turns_in_space():
     np.testing.assert_allclose(base.rates, [*speed, *turning], atol=1e-9)
 
 
+@pytest.mark.slow(seconds=1)
 def test_feet_that_stand_hold_a_trunk_whose_gyro_is_off_if_it_is_little_believed():
     robot = tc.load_floating_robot("go2")
     q = robot.neutral()
@@ -134,6 +135,7 @@ def test_a_robot_in_space_goes_on_its_estimate(name, motion):
     assert missed[:, robot.model.nq : robot.model.nq + 6].max() < 5e-3
 
 
+@pytest.mark.slow(seconds=1)
 def test_without_noise_a_walk_is_told_as_it_is(long_walk):
     found, truth = estimated(long_walk, SILENT)
     missed = np.abs(found - truth)

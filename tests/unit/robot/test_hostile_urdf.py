@@ -310,6 +310,7 @@ def test_a_fixed_joint_s_axis_and_limits_mean_nothing(load, five_link, axis):
     assert load(five_link.replace(ankle, odd)).leg_length == pytest.approx(0.9)
 
 
+@pytest.mark.slow(seconds=1)
 def test_links_and_joints_may_share_names_in_every_engine(tmp_path, five_link):
     text = five_link
     for joint, link in (

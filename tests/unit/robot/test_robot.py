@@ -19,6 +19,7 @@ from template_control.robot.library import (
 from template_control.robot.planar_biped import PlanarBiped
 
 
+@pytest.mark.slow(seconds=1)
 def test_robots_are_listed_and_called_by_the_names_that_load_them():
     listed = tc.robots()
     assert list(listed) == list(SHIPPED)

@@ -135,6 +135,7 @@ def test_a_free_robot_is_pushed_from_all_sides(tmp_path):
         CampaignConfig(mix=FLOATING_MIX)
 
 
+@pytest.mark.slow(seconds=1)
 def test_shares_and_figure_of_a_campaign():
     conditions = CampaignConfig()
     trials = tuple(

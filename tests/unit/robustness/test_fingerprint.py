@@ -94,6 +94,7 @@ def _told(code, seed):
     return done.stdout
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_trial_imports_no_room_that_does_not_count():
     code = """
 import sys
@@ -112,6 +113,7 @@ def test_the_digest_is_that_of_every_process():
     assert _told(code, "1") == _told(code, "2") == fingerprint._code(fingerprint._PACKAGE) + "\n"
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_urdf_counts():
     one, other = tc.load_robot("five-link"), tc.load_robot("rabbit")
     assert fingerprint.fingerprint(one) != fingerprint.fingerprint(other)

@@ -237,6 +237,7 @@ def cheap(monkeypatch, undisturbed):
     return run
 
 
+@pytest.mark.slow(seconds=1)
 def test_levels_rise_until_the_walk_breaks(cheap, tmp_path, monkeypatch):
     found = cheap(["heavier", "step-down"], tmp_path)
     down, heavier = found.findings

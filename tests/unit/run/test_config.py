@@ -60,6 +60,7 @@ KINDS_OF_RUN = {
 }
 
 
+@pytest.mark.slow(seconds=1)
 @pytest.mark.parametrize("kind", KINDS_OF_RUN)
 def test_a_run_of_any_kind_writes_what_repeats_it_bit_by_bit(kind, tmp_path):
     command, *words = shlex.split(KINDS_OF_RUN[kind])

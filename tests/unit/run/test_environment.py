@@ -36,6 +36,7 @@ def test_the_interface_is_gymnasium_s(experiment, residuals):
     env.close()
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_walk_at_the_wanted_speed_is_worth_one_a_stride():
     env = tc.run.WalkEnv(strides=10)
     low, high = tc.run.VelocityRange.of(tc.load_robot("five-link")).speeds
@@ -52,6 +53,7 @@ def test_a_walk_at_the_wanted_speed_is_worth_one_a_stride():
     env.close()
 
 
+@pytest.mark.slow(seconds=2)
 def test_episodes_repeat_with_their_seed_and_pushes_differ():
     env = tc.run.WalkEnv(strides=4, impulse=15.0)
     first, again, other = (walked(env, [0.0], seed=seed)[0] for seed in (1, 1, 2))
@@ -69,6 +71,7 @@ def test_a_fall_ends_an_episode_and_costs_ten():
     env.close()
 
 
+@pytest.mark.slow(seconds=2)
 def test_residuals_change_a_walk_that_keeps_its_speed_without_them():
     env = tc.run.WalkEnv(strides=8, residuals=True)
     seen, rewards, _, _ = walked(env, np.zeros(3), wanted=(0.8, 0.0))
@@ -78,6 +81,7 @@ def test_residuals_change_a_walk_that_keeps_its_speed_without_them():
     env.close()
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_floating_base_turns_as_it_is_commanded():
     env = tc.run.WalkEnv(BOLT, strides=16)
     seen, _, terminated, _ = walked(env, [0.0, 0.5], wanted=(0.55, 0.25))
@@ -90,6 +94,7 @@ def test_a_floating_base_turns_as_it_is_commanded():
     env.close()
 
 
+@pytest.mark.slow(seconds=2)
 def test_environments_walk_side_by_side():
     """Each has its own robot and world: alone and in a vector it walks alike."""
     make = lambda: tc.run.WalkEnv(strides=3)  # noqa: E731

@@ -49,6 +49,7 @@ def test_a_gait_is_found_where_another_return_to_level_flight_is_next_to_it():
     np.testing.assert_allclose(step, gait.vlo, atol=1e-9)
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_family_by_speed_at_vlo_has_no_hole():
     gaits = [walking_gait(P, speed) for speed in np.linspace(*speed_range(P), 201)]
     assert np.all(np.diff([gait.mean_speed for gait in gaits]) > 0.0)

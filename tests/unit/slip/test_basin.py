@@ -40,6 +40,7 @@ def test_vlo_states_and_energies_belong_together():
     assert np.isnan(vlo_state(P, 0.98, 0.0, 700.0)[0])
 
 
+@pytest.mark.slow(seconds=3)
 def test_steps_are_compiled_once_whatever_the_arrays_layouts_are(paper_gait):
     goal, z = np.array([0.9818, 0.0]), np.tile(paper_gait.vlo, (3, 1))
     for states in (z[:1], z, np.asfortranarray(z), z[::2]):
@@ -74,6 +75,7 @@ def test_convergence_is_to_this_gait_and_not_to_another():
     assert not steps_to_fall(P, z, gait.controls, np.array([0.9818, 0.0])).converges.any()
 
 
+@pytest.mark.slow(seconds=1)
 def test_margin_shrinks_towards_the_lower_limit():
     radii = []
     for energy in (822.5, 824.0, 826.0):

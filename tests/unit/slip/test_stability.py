@@ -128,6 +128,7 @@ def test_closed_loop_eigenvalues_of_an_lqr(paper_gait):
     np.testing.assert_allclose(z, paper_gait.vlo, atol=1e-3)
 
 
+@pytest.mark.slow(seconds=1)
 def test_gaits_command(tmp_path, capfd):
     assert main(["gaits", "--output", str(tmp_path), "--json"]) == 0
     data = json.loads(capfd.readouterr().out)

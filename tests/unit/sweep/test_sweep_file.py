@@ -150,6 +150,7 @@ def test_a_killed_sweep_goes_on_where_it_stopped(tmp_path, log, number, send, ex
     assert calls(log) == []
 
 
+@pytest.mark.slow(seconds=1)
 def test_a_torn_last_line_is_dropped_wherever_it_is_torn(tmp_path, log):
     path, items = tmp_path / "s.jsonl", grid(x=range(3))
     with ThreadPoolExecutor(1) as threads:
@@ -234,6 +235,7 @@ def test_paths_that_cannot_be_written_are_named(tmp_path):
             quietly(square, items, path)
 
 
+@pytest.mark.slow(seconds=1)
 def test_a_file_another_process_writes_is_refused(tmp_path, log):
     path = tmp_path / "s.jsonl"
     process = start_killed(path)

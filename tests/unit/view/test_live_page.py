@@ -91,6 +91,7 @@ def test_a_frame_is_what_a_replay_shows(floating):
     assert template == pytest.approx(columns["template_force"][..., 1].sum() / 3.0 / record.weight)
 
 
+@pytest.mark.slow(seconds=1)
 def test_joints_are_drawn_where_they_are_and_what_stands_still_is_not_sent_again():
     with tc.run.LiveRun(tc.Experiment(tc.load_floating_robot("bolt"))) as run:
         for tick in run:

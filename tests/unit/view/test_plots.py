@@ -80,6 +80,7 @@ def test_the_command_draws_elsewhere(record, tmp_path):
     assert [path.name for path in folder.iterdir()] == ["com.png"]
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_command_draws_what_it_is_asked_for(record, tmp_path, capfd):
     run = record.save(tmp_path / "run.npz")
     words = ["--figures", "com,forces", "--format", "pdf", "--start", "0.2", "--end", "-0.3"]
@@ -102,6 +103,7 @@ def test_a_run_draws_what_it_is_asked_for(tmp_path, capfd, refused):
     assert not (tmp_path / "template.npz").exists()
 
 
+@pytest.mark.slow(seconds=2)
 def test_a_scenario_draws_what_it_is_asked_for(tmp_path, capfd):
     words = ["go", str(EXAMPLES / "walk_run_walk.toml"), "--robot", "runner", "--steps", "1"]
     asked = ["--figures", "scenario,forces", "--format", "pdf", "--output", str(tmp_path)]

@@ -231,6 +231,7 @@ def without_visuals(record):
     return replace(record, metadata={**record.metadata, "urdf": text})
 
 
+@pytest.mark.slow(seconds=1)
 def test_a_robot_without_shapes_is_shown_with_sticks(record, tmp_path):
     bare = without_visuals(record)
     row, places = shown(bare)

@@ -51,6 +51,7 @@ def test_page_of_a_default_walk_is_small(record, tmp_path):
     assert sizes[0] + 25.3 * per_second < 10e6
 
 
+@pytest.mark.slow(seconds=1)
 def test_gif_shows_a_robot_that_moves(record, run_file, tmp_path, capfd):
     path = tmp_path / "walk.gif"
     part = ["--start", "0.5", "--end", "1", "--fps", "10"]
@@ -65,6 +66,7 @@ def test_gif_shows_a_robot_that_moves(record, run_file, tmp_path, capfd):
     assert np.mean(np.abs(pictures[0] - pictures[1]).max(axis=2) > 40) > 0.01
 
 
+@pytest.mark.slow(seconds=1)
 def test_a_gif_is_its_last_seconds_by_default(record, tmp_path):
     film = Image.open(tc.save_film(record, tmp_path / "walk.gif", speed=0.2, fps=1.0))
     assert film.n_frames == 5
@@ -117,6 +119,7 @@ def test_bad_input_is_one_line(arguments, culprit, run_file, tmp_path, monkeypat
 # Server and browser.
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_server_serves_the_page_and_ends(record, tmp_path, monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
@@ -202,6 +205,7 @@ def test_page_shows_a_walking_robot_in_a_browser_without_network(record, tmp_pat
     assert lower.sum() > upper.sum()
 
 
+@pytest.mark.slow(seconds=1)
 def test_the_server_takes_the_port_it_is_given(record, tmp_path, refused):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
@@ -218,6 +222,7 @@ def test_the_server_takes_the_port_it_is_given(record, tmp_path, refused):
     assert "--port is 0: give a whole number from 1 to 65535" in refused([*words, "0"])
 
 
+@pytest.mark.slow(seconds=3)
 def test_a_walk_without_its_meshes_names_the_first_and_every_view_shows_it(tmp_path, capfd):
     text = tc.robot.robot_path("five-link").read_text()
     names = iter(f"meshes/part_{i}.stl" for i in range(99))
