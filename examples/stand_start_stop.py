@@ -13,9 +13,9 @@ from itertools import groupby
 import numpy as np
 
 import template_control as tc
-from template_control.embedding import gaits_by_speed, standing_planners, standing_pose
+from template_control.embedding import standing_planners, standing_pose
 from template_control.robot import PlanarBiped
-from template_control.slip import Scenario, ScenarioRoute, Segment, SteadyRoute
+from template_control.slip import Scenario, ScenarioRoute, Segment, SteadyRoute, gaits_by_speed
 
 SPACINGS = (0.1, 0.2, 0.3, 0.4)  # m
 STARTS, STOPS = (0.5, 0.8, 1.1), (0.5, 0.9, 1.3)  # m/s

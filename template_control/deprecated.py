@@ -19,6 +19,7 @@ DEPRECATED = {
     "template_control.embedding.FreeControls": "template_control.embedding:RestContext",
     "template_control.embedding.LandingPlanner": "template_control.embedding:Planner",
     "template_control.embedding.PricingPlanner": "template_control.embedding:Planner",
+    "template_control.embedding.gaits_by_speed": "template_control.slip:gaits_by_speed",
     "template_control.embedding.rehearse": "template_control.embedding:check_feasibility",
     "template_control.embedding.SlopePlanner": "template_control.embedding:Planner",
     "template_control.embedding.SpeedChangePlanner": "template_control.embedding:CurvePlanner",

@@ -9,8 +9,8 @@ import numpy as np
 from template_control.embedding.planners.ahead import AHEAD
 from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.planners.modified import ModifiedPlanner
+from template_control.embedding.pressure import PRESSURE
 from template_control.embedding.robot_template import paper_gait, template_for
-from template_control.embedding.standing.pressure import PRESSURE
 from template_control.embedding.tick import CONTROL
 from template_control.estimation.delay import DELAY
 from template_control.plant.bullet import READ

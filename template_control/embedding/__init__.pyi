@@ -42,7 +42,6 @@ from .rollout import ReplanOptions as ReplanOptions
 from .standing.curves import StandingOptions as StandingOptions
 from .standing.curves import standing_pose as standing_pose
 from .standing.planners import CurvePlanner as CurvePlanner
-from .standing.planners import gaits_by_speed as gaits_by_speed
 from .standing.planners import standing_planners as standing_planners
 from .state import SectionReport as SectionReport
 from .state import Snapshot as Snapshot

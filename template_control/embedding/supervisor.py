@@ -25,7 +25,14 @@ from template_control.embedding.com_path import (
     plan_is_due,
 )
 from template_control.embedding.free.catching import CatchingStep
-from template_control.embedding.planners.planner import Cause, Context, Decision, Planner, Planners
+from template_control.embedding.planners.planner import (
+    Cause,
+    Context,
+    Decision,
+    Planner,
+    Planners,
+    settled,
+)
 from template_control.embedding.recovery import Recovery
 from template_control.embedding.replanning import (
     RULES,
@@ -353,7 +360,7 @@ class StrideSupervisor:
             return None
         start = np.column_stack((sensed.state[:2], sensed.state[2:4], sensed.acceleration))
         toes = float(sensed.toes[0]), float(sensed.toes[1])
-        self.decision, first = planner.catch(begins, start, toes, step)
+        self.decision, first = planner.curve(begins, start, toes, settled(planner.gait), step)
         self.goal = replace(self.goal, stride=kind, target=planner.gait.state)
         self.without_touchdown = False
         return self._take(self.automaton.node(first.start), first, sensed.state, sensed, now)

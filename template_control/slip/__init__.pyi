@@ -46,6 +46,7 @@ from .gaits.running_gait import running_gait as running_gait
 from .gaits.running_gait import running_speeds as running_speeds
 from .gaits.walking_by_speed import SpeedFamily as SpeedFamily
 from .gaits.walking_by_speed import gait_for_speed as gait_for_speed
+from .gaits.walking_by_speed import gaits_by_speed as gaits_by_speed
 from .gaits.walking_by_speed import walking_by_speed as walking_by_speed
 from .gaits.walking_by_speed import walking_gait as walking_gait
 from .lateral.gait import LateralCycle as LateralCycle

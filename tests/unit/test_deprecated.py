@@ -15,6 +15,7 @@ OLD_NAMES = {
     "template_control.embedding.Free",
     "template_control.embedding.FreeController",
     "template_control.embedding.FreeControls",
+    "template_control.embedding.gaits_by_speed",
     "template_control.embedding.LandingPlanner",
     "template_control.embedding.PricingPlanner",
     "template_control.embedding.rehearse",

@@ -29,8 +29,8 @@ from template_control.embedding.phases import (
 )
 from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD
 from template_control.embedding.planners.lqr import LqrOptions
+from template_control.embedding.pressure import UNLOADING
 from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.standing.pressure import UNLOADING
 from template_control.embedding.swing import SwingOptions
 from template_control.estimation.filters import NoiseFilterOptions
 from template_control.robot.biped import Biped

@@ -1,7 +1,7 @@
 """Lateral motion over feet that bear a moment: as the gait's, or by a plan of their pressure.
 
 Where both feet stand and the CoM follows a curve in time, and in a step from a stand, the lateral
-motion is planned as the curve's x is: by the quadratic program of :mod:`~..standing.pressure`
+motion is planned as the curve's x is: by the quadratic program of :mod:`~..pressure`
 through the phases that are to come, each with the feet that stand in it.
 
 ``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``, ``curve`` the path's.
@@ -16,7 +16,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.embedding.com_path import sample
-from template_control.embedding.standing.pressure import (
+from template_control.embedding.pressure import (
     ARRIVE,
     SMOOTH,
     UNLOADING,

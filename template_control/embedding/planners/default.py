@@ -17,15 +17,11 @@ from template_control.embedding.planners.transition import (
     TransitionPlanner,
 )
 from template_control.embedding.standing.curves import StandingOptions
-from template_control.embedding.standing.planners import (
-    gaits_by_speed,
-    recovery_planners,
-    standing_planners,
-)
+from template_control.embedding.standing.planners import recovery_planners, standing_planners
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait, running_speeds
-from template_control.slip.gaits.walking_by_speed import walking_gait
+from template_control.slip.gaits.walking_by_speed import gaits_by_speed, walking_gait
 from template_control.slip.maps.section import APEX, REST
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.slip.scenario.scenario import STAND, STAND_HEIGHT

@@ -19,7 +19,7 @@ from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.embedding.free.catching import CatchingStep
-from template_control.embedding.standing.pressure import (
+from template_control.embedding.pressure import (
     SMOOTH,
     UNLOADING,
     Ground,
@@ -120,7 +120,7 @@ _PIECES = 20  # of a curve of one stage
 _OF_STAGE = 8  # of each of several
 _FALL = 0.5  # largest downward acceleration that a curve begins with, over g
 _LED = 0.05  # excess up to which a curve is led to its end, over l0
-_LOW = 0.3  # least height of the CoM that a step is planned with [m], over l0
+_LOW = 0.3  # least height of the CoM that a step is planned with, over l0
 _PASSING = 2.0  # longest time to a foot that is passed, over that at the present speed
 # Of the ground under the feet that a plan uses: folding legs ask for a little more.
 _SHARE = 0.8
@@ -180,6 +180,12 @@ class BetweenFeet:
         uphill = height * np.tan(self.parameters.slope)
         return np.array([[x + uphill, 0.0, 0.0], [height, 0.0, 0.0]])
 
+    def capture(self, state: Array) -> float:
+        """The capture point x + dx/dt sqrt(y / g) [m]; x where the CoM is not above the ground."""
+        (x, speed, _), y = state[0], state[1, 0]
+        # A robot that falls may have its CoM below where its foot was to stand.
+        return float(x + speed * np.sqrt(max(y, 0.0) / self.parameters.gravity))
+
     def to_rest(self, start: Array, lands: bool = False) -> Found:
         """Curve to rest at the place to stand.
 
@@ -198,11 +204,10 @@ class BetweenFeet:
         A front foot that has just landed (``lands``) takes up load at once. The rear foot has no
         load left at the end.
         """
-        (x, speed, _), (height, *_) = start.tolist()
-        rate = np.sqrt(self.parameters.gravity / max(height, 0.01 * self.parameters.rest_length))
+        x, speed, _ = start[0].tolist()
         moves = speed > _STILL * self.parameters.speed_unit
         times = _DURATIONS * self._scale.time
-        if moves and x + speed / rate > self.toes[1]:
+        if moves and self.capture(start) > self.toes[1]:
             # Once the capture point is past the foot that stays, the CoM is not thrown back again.
             longest = _PASSING * max(self.toes[1] - x, 0.0) / speed
             times = times[times <= max(longest, times[0])]
@@ -245,20 +250,17 @@ class BetweenFeet:
         apart = np.minimum(apart, _FARTHEST * length)
         if catching is not None:
             apart = np.full(len(air), catching.foothold - stands)
-        late = np.maximum(
-            apart + self.spacing + 2.0 * spare - _NIMBLE * self._scale.speed * air, 0.0
-        )
+        way = apart + self.spacing + 2.0 * spare
+        late = np.maximum(way - _NIMBLE * self._scale.speed * air, 0.0)
         foot, half = stands + apart, self._half
         middle = 0.5 * (stands + foot)
         feet = stands + spare * np.sign(apart), foot - spare * np.sign(apart)
-        stages = np.concatenate(
-            (
-                _stage(both, self.toes, half, stands, lifts=1.0),
-                _stage(air, (pressure, pressure), 0.0, pressure),
-                _stage(rest, feet, half, middle),
-            ),
-            axis=1,
+        three = (
+            _stage(both, self.toes, half, stands, lifts=1.0),
+            _stage(air, (pressure, pressure), 0.0, pressure),
+            _stage(rest, feet, half, middle),
         )
+        stages = np.concatenate(three, axis=1)
         ends = np.repeat(self.at_rest(0.0)[None], len(foot), axis=0)
         ends[:, 0, 0] += middle
         price = self._price(rest) + _NARROW * np.abs(apart - closing) + _HURRY * late

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
+from template_control.embedding.pressure import PRESSURE
 from template_control.embedding.standing.curves import CLOSING, BetweenFeet, StandingOptions
-from template_control.embedding.standing.pressure import PRESSURE
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import StrideSimulator, controls
@@ -94,12 +94,6 @@ class PassTable:
     def feet(self, toes: tuple[float, float]) -> BetweenFeet:
         """Both feet on the ground, at x of the rear and the front one [m]."""
         return BetweenFeet(toes, self.parameters, self.options)
-
-    def capture(self, state: Array) -> float:
-        """The capture point x + dx/dt sqrt(y / g) [m]; x where the CoM is not above the ground."""
-        (x, speed, _), y = state[0], state[1, 0]
-        # A robot that falls may have its CoM below where its foot was to stand.
-        return float(x + speed * np.sqrt(max(y, 0.0) / self.parameters.gravity))
 
     def between(self, wanted: float, present: float) -> list[float]:
         """Speeds at VLO that are tried, the best first [m/s].

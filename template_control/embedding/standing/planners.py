@@ -15,26 +15,15 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.embedding.free.catching import CatchingStep
-from template_control.embedding.planners.planner import (
-    Context,
-    Decision,
-    Planner,
-    RestContext,
-    settled,
-)
-from template_control.embedding.standing.curves import (
-    PLACE,
-    BetweenFeet,
-    Found,
-    StandingOptions,
-)
+from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
+from template_control.embedding.standing.curves import PLACE, BetweenFeet, Found, StandingOptions
 from template_control.embedding.standing.passes import PassTable, SingleSupportPass
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride, chained, controls
 from template_control.slip.dynamics.timed import Quintic, timed_stride
 from template_control.slip.gaits.gait import Gait, GaitsBySpeed
-from template_control.slip.gaits.walking_by_speed import paper_walks, walking_by_speed
+from template_control.slip.gaits.walking_by_speed import gaits_by_speed, paper_walks
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, scaled
 
@@ -137,9 +126,18 @@ class CurvePlanner(Planner):
         return None if self._walk is None else self._walk.decide_rest(context)
 
     def curve(
-        self, node: str, start: Array, toes: tuple[float, float], decision: Decision
+        self,
+        node: str,
+        start: Array,
+        toes: tuple[float, float],
+        decision: Decision,
+        catching: CatchingStep | None = None,
     ) -> tuple[Decision, Stride]:
-        """See :meth:`~.planner.Planner.curve`."""
+        """See :meth:`~.planner.Planner.curve`.
+
+        ``catching`` is the step that catches the robot, over the foot that stays as over a centre
+        of pressure at rest; None: the planner's own step.
+        """
         here = AUTOMATON.node(node)
         if here.edge(Event.REST) is not None:
             way, lands = self._way, self._lands or self._steps
@@ -148,7 +146,7 @@ class CurvePlanner(Planner):
             stride = timed_stride(AUTOMATON, node, self._resting(feet, found.pieces), toes)
             return replace(decision, feasible=feet.fits(found)), stride
         if self._steps:
-            return self._step(node, start, toes, decision)
+            return self._step(node, start, toes, decision, catching)
         feet = self._passes.feet(toes)
         found, over = self._away(feet, start, float(decision.predicted[0]))
         u = decision.controls.copy()
@@ -169,19 +167,6 @@ class CurvePlanner(Planner):
             accepted=None if speed == decision.predicted[0] else speed,
         )
         return chosen, chained(first, second)
-
-    def catch(
-        self, node: str, start: Array, toes: tuple[float, float], step: CatchingStep
-    ) -> tuple[Decision, Stride]:
-        """A step that catches the robot: over the other foot as over a centre of pressure at rest.
-
-        Args:
-            node: the first, or single stance.
-            start: as for :meth:`curve`.
-            toes: the same.
-            step: which it is.
-        """
-        return self._step(node, start, toes, settled(self.gait), step)
 
     def _away(
         self, feet: BetweenFeet, start: Array, wanted: float
@@ -221,7 +206,7 @@ class CurvePlanner(Planner):
         start: Array,
         toes: tuple[float, float],
         decision: Decision,
-        catching: CatchingStep | None = None,
+        catching: CatchingStep | None,
     ) -> tuple[Decision, Stride]:
         """To rest by a step over the foot that stays; the other one lifts off first, or has."""
         way, passes, ahead = self._way, self._passes, self._turned(start)
@@ -244,7 +229,7 @@ class CurvePlanner(Planner):
         if catching is not None:
             return replace(decision, feasible=feet.fits(found)), stride
         behind = feet.toes[1] if lifted else feet.place(PLACE) - self._behind
-        fits = (lifted or found.excess <= self._launch) and passes.capture(ahead) > behind
+        fits = (lifted or found.excess <= self._launch) and feet.capture(ahead) > behind
         return replace(decision, feasible=fits), stride
 
     def _turned(self, state: Array) -> Array:
@@ -254,15 +239,6 @@ class CurvePlanner(Planner):
     def _back(self, pieces: tuple[Quintic, ...]) -> list[Quintic]:
         """The pieces of a curve, planned forward, in the world."""
         return [Quintic(self._turned(piece.coefficients), piece.duration) for piece in pieces]
-
-
-def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
-    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg.
-
-    Args:
-        parameters: the template.
-    """
-    return walking_by_speed().chains[-1].gaits(parameters)
 
 
 def recovery_planners(walk: Planner, options: StandingOptions) -> dict[str, Planner]:
@@ -291,7 +267,7 @@ def standing_planners(
     Args:
         parameters: the template.
         options: tuning, for the reference template.
-        family: the gaits that a walk may have, such as :func:`gaits_by_speed`; None: the library's
+        family: the gaits that a walk may have, such as :func:`.gaits_by_speed`; None: the library's
             own.
     """
     gaits = family or paper_walks(parameters)

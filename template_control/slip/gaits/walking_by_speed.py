@@ -264,6 +264,15 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
     return gait_at(parameters, float(angle), vlo_speed)
 
 
+def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
+    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg.
+
+    Args:
+        parameters: the template.
+    """
+    return walking_by_speed().chains[-1].gaits(parameters)
+
+
 def paper_walks(parameters: SlipParameters) -> GaitsBySpeed:
     """The gaits of :func:`walking_gait`."""
     return GaitsBySpeed(partial(walking_gait, parameters), speed_range(parameters))

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from template_control.embedding.standing.curves import BetweenFeet, StandingOptions
-from template_control.embedding.standing.pressure import (
+from template_control.embedding.pressure import (
     ARRIVE,
     SMOOTH,
     UNLOADING,
@@ -18,6 +17,7 @@ from template_control.embedding.standing.pressure import (
     bounded,
     pressure,
 )
+from template_control.embedding.standing.curves import BetweenFeet, StandingOptions
 from template_control.slip.dynamics.timed import polynomial
 from template_control.slip.parameters import SlipParameters
 

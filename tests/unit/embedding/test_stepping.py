@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding import (
-    StandingOptions,
-    gaits_by_speed,
-    standing_planners,
-    standing_pose,
-)
+from template_control.embedding import StandingOptions, standing_planners, standing_pose
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.recovery import ways_to_rest
-from template_control.embedding.standing.curves import CLOSING
-from template_control.embedding.standing.passes import PassTable
+from template_control.embedding.standing.curves import CLOSING, BetweenFeet
 from template_control.run.options import Push
-from template_control.slip import Event
+from template_control.slip import Event, gaits_by_speed
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.maps.section import REST
 from template_control.slip.scenario.route import SteadyRoute
@@ -168,7 +162,7 @@ def test_a_robot_walks_slowly_with_the_family_by_speed_and_closes_its_feet():
 def test_a_robot_that_falls_has_no_capture_point_ahead():
     """Its CoM may be below where its foot was to stand."""
     height, speed = 0.9, 0.5
-    capture = PassTable(P, StandingOptions(), gaits_by_speed(P)).capture
+    capture = BetweenFeet((0.0, 0.3), P, StandingOptions()).capture
     above = np.array([[0.2, speed, 0.0], [height, 0.0, 0.0]])
     assert capture(above) == pytest.approx(0.2 + speed * np.sqrt(height / P.gravity))
     below = np.array([[0.2, speed, 0.0], [-0.1, 0.0, 0.0]])
