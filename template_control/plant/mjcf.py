@@ -53,6 +53,8 @@ def mjcf(robot: Biped, world: PlantOptions, contact_time: float) -> str:
     )
     # A state that is no number any more is the controller's to refuse, not to be put back.
     _add(option, "flag", autoreset="disable")
+    # A joint's stop gives as little as the ground.
+    _add(_add(root, "default"), "joint", solreflimit=_text((contact_time, 1.0)))
     ground = _add(root, "worldbody")
     _add_ground(ground, world, contact_time)
     # MuJoCo weighs a contact's give by the robot's pose with all joints at their `ref`.
