@@ -176,12 +176,15 @@ def swing_step(
     quintic_step(x, place, 0.0, till, dt)
     top = max(ground + f.clearance[foot], f.over[foot])
     rising = f.rise[foot] * to_go - (1.0 - f.rise[foot]) * elapsed
-    descends = y[1] < -landing_speed  # not even for a touchdown that is put off does it rise anew
-    if rising > horizon and not descends:
+    # A foot that comes down does not rise anew where its touchdown is put off.
+    fast = max(landing_speed, (top - ground) / (elapsed + to_go))
+    descends = y[0] > ground and y[1] < -fast
+    rises, stays = rising > horizon and not descends, to_go > f.descent[foot] and not descends
+    if rises:
         left = (top - y[0]) / max(top - ground, _FLAT)
         least = _HASTE * left * f.rise[foot] * (elapsed + to_go)
         quintic_step(y, top, 0.0, max(rising, least), dt)
-    elif to_go > f.descent[foot] and not descends:
+    elif stays:
         # Up: stay there, and come to rest where the rise was cut short.
         quintic_step(y, top, 0.0, max(2.0 * horizon, dt), dt)
     elif foreseen and _arrives_early(y, ground, -landing_speed, to_go):

@@ -152,6 +152,18 @@ def test_no_foot_is_flung_up_where_its_touchdown_is_put_off(shape, first, begun,
     assert soonest < 1.5 * shape.horizon
 
 
+@pytest.mark.parametrize("landing_speed", [0.0, 0.2])
+@pytest.mark.parametrize(("height", "speed"), [(1e-3, -0.3), (0.0, -0.3), (1e-3, -1e-9)])
+def test_a_foot_that_lifts_off_on_its_way_down_rises(height, speed, landing_speed):
+    """As its measured velocity may say."""
+    options = SwingOptions(landing_speed=landing_speed)
+    swing, heights = Swing(options, np.array([0.0, height]), np.array([0.0, speed])), []
+    for left in np.arange(0.4, 0.0, -1e-3):
+        swing.advance(0.6, left)
+        heights.append(swing.y[0])
+    assert max(heights) == pytest.approx(options.clearance, abs=6e-3)
+
+
 @pytest.mark.parametrize(("foreseen", "brakes"), [(True, True), (False, False)])
 def test_no_foot_brakes_for_a_guess(foreseen, brakes):
     """Nearly on the ground; by the gait alone, it would land 0.13 s from now."""
