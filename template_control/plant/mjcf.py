@@ -133,9 +133,7 @@ def _add_planar(ground: Element, robot: Biped, world: PlantOptions) -> dict[int,
         for above in chain:
             here = here * data.liMi[above]
             ref, hinge = float(neutral[above - 1]), above - 1 - PLANAR_DOF
-            own = (
-                _stops(model, above) | _losses(robot, hinge, world.time_step) if hinge >= 0 else {}
-            )
+            own = _hinge(robot, hinge, world.time_step) if hinge >= 0 else {}
             _add_joint(body, model, above, here, axes[:, above - 1], ref=ref, own=own)
         # The robot turns about the axis of its hinges only, where any rotation leaves the inertia
         # as it is. MuJoCo refuses the flat inertias of a planar model, whose other two axes have
@@ -161,7 +159,7 @@ def _add_floating(ground: Element, robot: Biped, world: PlantOptions) -> dict[in
         else:
             axis = data.oMi[joint].rotation.T @ axes[3:, model.idx_vs[joint]]
             about = {"axis": _text(axis), "ref": repr(float(neutral[model.idx_qs[joint]]))}
-            about |= _stops(model, joint) | _losses(robot, joint - 1 - _ROOT, world.time_step)
+            about |= _hinge(robot, joint - 1 - _ROOT, world.time_step)
             _add(body, "joint", name=model.names[joint], type="hinge", **about)
         i = world.mass_scale * model.inertias[joint].inertia
         moments = _text((i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]))
@@ -209,16 +207,11 @@ def _add_joint(
     _add(body, "joint", **about, **own)
 
 
-def _stops(model: pin.Model, joint: int) -> dict[str, str]:
-    """Attributes of a joint that has stops."""
-    place = model.idx_qs[joint]
-    stops = model.lowerPositionLimit[place], model.upperPositionLimit[place]
-    return {"range": _text(stops)} if np.abs(stops).max() < UNLIMITED else {}
-
-
-def _losses(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
-    """Attributes of a joint that has damping or friction; ``joint``: among the actuated ones."""
-    found = {}
+def _hinge(robot: Biped, joint: int, time_step: float) -> dict[str, str]:
+    """Stops, damping and friction of a joint that has them; ``joint``: among the actuated ones."""
+    found, stops = {}, robot.joint_range[joint]
+    if np.abs(stops).max() < UNLIMITED:
+        found["range"] = _text(stops)
     damping, friction = robot.joint_damping[joint], robot.joint_friction[joint]
     if damping > 0.0:
         found["damping"] = repr(float(damping))
