@@ -35,10 +35,8 @@ from template_control.embedding.planners.look_ahead import (
     TOO_SHORT,
     PlanCosts,
     PlanProblem,
-    begin,
-    look_ahead,
+    first_plan,
     new_problem,
-    roughness,
     step_controls,
 )
 from template_control.embedding.planners.lqr import (
@@ -51,6 +49,7 @@ from template_control.embedding.planners.planner import ANY_ANGLE, Context, Deci
 from template_control.embedding.planners.speed_changes import SpeedChange, speed_changes
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.control.least_squares import Search
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import WalkingGait
@@ -58,6 +57,7 @@ from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
+from template_control.structured import Kept, keep
 from template_control.warm_up import Part, ready
 
 RISE = (0.13, 0.01)
@@ -74,6 +74,7 @@ _EFFORT = 16  # linearisations of plans, after which no other change of the tabl
 _OFF = 2.0  # tolerances off a gait, up to which the plan is one near it
 _BEARABLE = 3.0  # excess of a plan near a change of speed at most
 _DEAREST = 60.0  # and its cost
+_NEVER = -1.0, 0.0  # excess and cost up to which a step's roughness counts where none is rough
 _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2, others up to 0.5
 # Pace with heavy legs [m/s], for the reference template: with twice as much 2 of 10 random profiles
 # of rabbit ended in a fall, with changes of the table 5.
@@ -137,16 +138,21 @@ class WalkLimits(NamedTuple):
 
 
 class _Plan(NamedTuple):
-    """Plan to a speed; its problem is the next plan's of so many steps too."""
+    """Plan to a speed."""
 
-    problem: PlanProblem
-    x: Array
+    effort: int  # linearisations
     cost: float
     excess: float
+    roughness: float  # of its first step; 0 where it does not count
     speed: float  # dx/dt at VLO of the gait that it leads to [m/s]
     controls: Array  # (6,) of its first step
     end: Array  # (3,) of its first step
     changes: bool  # its speed, from one gait to another one, and is not yet in its last step
+
+    @property
+    def price(self) -> float:
+        """Cost with that of a rough step."""
+        return self.cost + self.roughness**2
 
 
 class AheadPlanner(Planner):
@@ -194,7 +200,7 @@ class AheadPlanner(Planner):
             pace = min(o.pace, _HEAVY_PACE * scale.speed)
             o = self.options = replace(o, changes=0, pace=pace)
         self._costs = plan_costs(parameters, o, self.limits)
-        self._problems: dict[int, PlanProblem] = {}
+        self._problems: dict[int, tuple[PlanProblem, Kept]] = {}
         self._changes = speed_changes(parameters)
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._lead_to(self._first)
@@ -242,19 +248,19 @@ class AheadPlanner(Planner):
         present = min(max(float(z[0]), low), high)
         aim = float(np.clip(wanted, *self.limits.speeds))
         change = min(max(aim - present, -o.pace), o.pace)
-        rough, price, effort = None, np.inf, 0
+        rough: _Plan | None = None
+        price, effort = np.inf, 0
         for goal, way in self._towards(z, aim):
             if effort >= _EFFORT:
                 break
-            plan = self._look(context, goal, way, np.inf)
-            effort += plan.problem.linearised[0]
+            plan = self._look(context, goal, way, SEARCH, (_BEARABLE, _DEAREST))
+            effort += plan.effort
             if plan.excess > _BEARABLE or plan.cost > _DEAREST:
                 continue
-            error = roughness(plan.problem, plan.x, 0)
-            if error <= _ROUGHEST:
+            if plan.roughness <= _ROUGHEST:
                 return self._begin(plan, wanted)
-            if rough is None or plan.cost + error**2 < price:
-                rough, price = plan, plan.cost + error**2
+            if rough is None or plan.price < price:
+                rough, price = plan, plan.price
         aims = list(dict.fromkeys(present + share * change for share in _SHARES))
         begun_to = None
         if begun is not None and begun.nominal:
@@ -263,13 +269,13 @@ class AheadPlanner(Planner):
             begun_to = aim if begun.accepted is None else begun.accepted
             aims.insert(0, begun_to)
         cheapest: _Plan | None = None
+        dearest = o.dearest or np.inf
+        judged = _NEVER if rough is None else (o.cheap, dearest)
         for speed in aims:
             hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
-            plan = self._look(context, speed, None, hopeless)
-            if plan.excess <= o.cheap and plan.cost <= (o.dearest or np.inf):
-                error = 0.0 if rough is None else roughness(plan.problem, plan.x, 0)
-                if plan.cost + error**2 < price:
-                    return self._begin(plan, wanted)
+            plan = self._look(context, speed, None, SEARCH._replace(hopeless=hopeless), judged)
+            if plan.excess <= o.cheap and plan.cost <= dearest and plan.price < price:
+                return self._begin(plan, wanted)
             if plan.cost < (np.inf if cheapest is None else cheapest.cost):
                 cheapest = plan
         if rough is not None:
@@ -296,13 +302,22 @@ class AheadPlanner(Planner):
                 yield goal, way
 
     def _look(
-        self, context: Context, speed: float, change: SpeedChange | None, hopeless: float
+        self,
+        context: Context,
+        speed: float,
+        change: SpeedChange | None,
+        search: Search,
+        judged: tuple[float, float],
     ) -> _Plan:
-        """A plan to a speed, near a change of speed or near its gait."""
+        """A plan to a speed, near a change of speed or near its gait.
+
+        ``judged`` are the excess and the cost up to which its roughness counts.
+        """
         steps = self.options.steps if change is None else len(change.controls)
         if steps not in self._problems:
-            self._problems[steps] = new_problem(self._costs, steps)
-        p, row = self._problems[steps], row_at(self.table, speed)
+            problem = new_problem(self._costs, steps)
+            self._problems[steps] = problem, keep(problem)
+        (p, kept), row = self._problems[steps], row_at(self.table, speed)
         target = row[STATE:COST] + row[SETTLING:STEP_DURATION].reshape(-1, STATES) @ self.offset
         p.start[:], p.offset[:], p.linearised[0] = context.z, self.offset, 0
         lifted, due = context.lifted, context.due
@@ -317,13 +332,13 @@ class AheadPlanner(Planner):
         else:
             states[:], free[:], stiffness[:] = change.states[1:], change.controls, change.stiffness
         x, (least, most) = np.empty(len(p.lower)), context.angles
-        begin(p, (float(least), float(most)), x)
-        cost, excess = look_ahead(p, SEARCH._replace(hopeless=hopeless), x)
+        angles = float(least), float(most)
+        cost, excess, error = first_plan(kept, angles, search, judged, x)
         return _Plan(
-            problem=p,
-            x=x,
+            effort=int(p.linearised[0]),
             cost=float(cost),
             excess=float(excess),
+            roughness=float(error),
             speed=speed,
             controls=step_controls(x[:CONTROLS], stiffness[0]),
             end=p.ends[0].copy(),
@@ -367,10 +382,7 @@ def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
     costs = plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0))
     problem = new_problem(costs, 1)
-    x = np.ones(CONTROLS)
-    begin(problem, ANY_ANGLE, x)
-    look_ahead(problem, SEARCH, x)
-    roughness(problem, x, 0)
+    first_plan(keep(problem), ANY_ANGLE, SEARCH, _NEVER, np.ones(CONTROLS))
 
 
 AHEAD = (Part(plan_ahead, 10.0),)

@@ -39,6 +39,7 @@ from template_control.slip.maps.return_map import (
     recorded_jacobian,
     recorded_stride,
 )
+from template_control.structured import Kept
 
 BOUNDS = np.array([[ANGLE_RANGE[0], 0.35, 0.35, 0.35], [ANGLE_RANGE[1], 1.5, 1.5, 1.5]])
 """(2, 4) least and greatest alpha relative to the reference's [rad], and stiffnesses over k.
@@ -353,22 +354,45 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
     Where a leg nearly lifts off, or lands, a little earlier than it does, other states lead
     elsewhere: there the error is large, or inf where the template completes no step.
     """
-    c, worst, end = p.costs, 0.0, np.empty(STATES)
+    c, worst, ends = p.costs, 0.0, np.empty((STATES, 2, STATES))
     _load(p, x, i)
-    _step(p, i)
-    _linearise(p, i, FULL_DEGREE)
-    for j in range(STATES):
-        end[j] = p.result[j]
     for k in range(STATES):
         at = p.z[k]
         for side in range(2):
-            change = (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
-            p.z[k] = at + change
+            p.z[k] = at + (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
             outcome = _step(p, i)
             p.z[k] = at
             if outcome != 0:
                 return np.inf
             for j in range(STATES):
-                miss = p.result[j] - end[j] - p.jacobian[j, k] * change
+                ends[k, side, j] = p.result[j]
+    _step(p, i)
+    _linearise(p, i, FULL_DEGREE)
+    for k in range(STATES):
+        for side in range(2):
+            change = (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
+            for j in range(STATES):
+                miss = ends[k, side, j] - p.result[j] - p.jacobian[j, k] * change
                 worst = max(worst, abs(miss) / (STATE_TOLERANCE[j] * c.unit[j]))
     return worst
+
+
+@compiled
+def first_plan(
+    kept: Kept,
+    angles: tuple[float, float],
+    search: Search,
+    judged: tuple[float, float],
+    x: Array,
+) -> tuple[float, float, float]:
+    """:func:`begin`, :func:`look_ahead` and the first step's :func:`roughness`, in one call.
+
+    ``kept`` is the :class:`PlanProblem`. Returns the cost, the excess and the roughness, which is 0
+    where excess or cost are more than ``judged``.
+    """
+    p, error = kept.value, 0.0
+    begin(p, angles, x)
+    cost, excess = look_ahead(p, search, x)
+    if excess <= judged[0] and cost <= judged[1]:
+        error = roughness(p, x, 0)
+    return cost, excess, error

@@ -68,12 +68,13 @@ def new_tangents() -> Tangents:
 
 
 @inner
-def _product(a: Array, b: Array, n: int) -> float:
-    """Coefficient ``n`` of the product of two series."""
-    total = 0.0
+def _products(a: Array, b: Array, c: Array, d: Array, n: int) -> tuple[float, float]:
+    """Coefficients ``n`` of the products a b and c d of series: two sums that do not wait."""
+    first = second = 0.0
     for j in range(n + 1):
-        total += a[j] * b[n - j]
-    return total
+        first += a[j] * b[n - j]
+        second += c[j] * d[n - j]
+    return first, second
 
 
 @inner
@@ -93,7 +94,8 @@ def _leg_series(
     start = cx[0]
     cx[0] = start - toe  # the series of d_x, until the end of this function
     for n in range(degree - 1):
-        squared[n] = _product(cx, cx, n) + _product(cy, cy, n)
+        x, y = _products(cx, cx, cy, cy, n)
+        squared[n] = x + y
         if n == 0:
             cube[0] = squared[0] ** -1.5
         else:
@@ -101,17 +103,16 @@ def _leg_series(
             for j in range(n):
                 total += (-1.5 * (n - j) - j) * squared[n - j] * cube[j]
             cube[n] = total / (n * squared[0])
-        inverse[n] = _product(cube, squared, n)
-        tilt[n] = _product(cube, cx, n)
-        xx[n] = _product(tilt, cx, n)
-        xy[n] = _product(tilt, cy, n)
+        inverse[n], tilt[n] = _products(cube, squared, cube, cx, n)
+        xx[n], xy[n] = _products(tilt, cx, tilt, cy, n)
         stretch = rest_length * inverse[n] - (1.0 if n == 0 else 0.0)
         force[0, n] = share * (stretch - rest_length * xx[n])
         force[1, n] = -share * rest_length * xy[n]
         force[2, n] = share * (stretch - rest_length * (inverse[n] - xx[n]))
     for n in range(degree - 1):
-        pull[0, n] = (rest_length * _product(inverse, cx, n) - cx[n]) / mass
-        pull[1, n] = (rest_length * _product(inverse, cy, n) - cy[n]) / mass
+        x, y = _products(inverse, cx, inverse, cy, n)
+        pull[0, n] = (rest_length * x - cx[n]) / mass
+        pull[1, n] = (rest_length * y - cy[n]) / mass
     cx[0] = start
 
 

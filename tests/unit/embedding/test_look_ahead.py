@@ -36,6 +36,7 @@ from template_control.embedding.planners.look_ahead import (
     SMALL,
     STATES,
     begin,
+    first_plan,
     knee_moment,
     look_ahead,
     new_problem,
@@ -57,6 +58,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
+from template_control.structured import keep
 from template_control.warm_up import ANNOUNCEMENT
 
 P = tc.SlipParameters()
@@ -148,6 +150,16 @@ def test_roughness_is_what_the_linear_map_misses(speed):
 def test_a_step_that_another_state_does_not_complete_is_rough():
     _, _, p, x = plan_from(np.array([0.241, 0.977, 0.105]), 0.24)  # rises out of a slow gait
     assert roughness(p, x, 0) == np.inf
+
+
+@pytest.mark.parametrize("judged", [(20.0, np.inf), (-1.0, 0.0)])
+def test_a_plan_in_one_call_is_that_of_three(judged):
+    z = row_at(table(), 0.8)[STATE:CONTROL] + [0.03, 0.002, 0.05]
+    cost, excess, p, x = plan_from(z, 0.9)
+    y = np.empty_like(x)
+    rough = roughness(p, x, 0) if judged[0] > excess else 0.0
+    assert first_plan(keep(p), ANY_ANGLE, SEARCH, judged, y) == (cost, excess, rough)
+    np.testing.assert_array_equal(y, x)
 
 
 @pytest.mark.parametrize("speed", [0.2, 0.36, 0.8, 1.3])
@@ -371,7 +383,7 @@ def test_a_decision_has_an_end(monkeypatch):
 
     def counted(*question):
         plan = look(*question)
-        counts[-1].append((question[2] is not None, int(plan.problem.linearised[0])))
+        counts[-1].append((question[2] is not None, plan.effort))
         return plan
 
     monkeypatch.setattr(planner, "_look", counted)
