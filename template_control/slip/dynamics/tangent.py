@@ -69,7 +69,7 @@ def new_tangents() -> Tangents:
 
 @inner
 def _products(a: Array, b: Array, c: Array, d: Array, n: int) -> tuple[float, float]:
-    """Coefficients ``n`` of the products a b and c d of series: two sums that do not wait."""
+    """Coefficients ``n`` of the products a b and c d of series, two independent sums."""
     first = second = 0.0
     for j in range(n + 1):
         first += a[j] * b[n - j]
