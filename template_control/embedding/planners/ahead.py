@@ -35,7 +35,7 @@ from template_control.embedding.planners.look_ahead import (
     TOO_SHORT,
     PlanCosts,
     PlanProblem,
-    first_plan,
+    make_plan,
     new_problem,
     step_controls,
 )
@@ -333,7 +333,7 @@ class AheadPlanner(Planner):
             states[:], free[:], stiffness[:] = change.states[1:], change.controls, change.stiffness
         x, (least, most) = np.empty(len(p.lower)), context.angles
         angles = float(least), float(most)
-        cost, excess, error = first_plan(kept, angles, search, judged, x)
+        cost, excess, error = make_plan(kept, angles, search, judged, x)
         return _Plan(
             effort=int(p.linearised[0]),
             cost=float(cost),
@@ -382,7 +382,7 @@ def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
     costs = plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0))
     problem = new_problem(costs, 1)
-    first_plan(keep(problem), ANY_ANGLE, SEARCH, _NEVER, np.ones(CONTROLS))
+    make_plan(keep(problem), ANY_ANGLE, SEARCH, _NEVER, np.ones(CONTROLS))
 
 
 AHEAD = (Part(plan_ahead, 10.0),)

@@ -378,7 +378,7 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
 
 
 @compiled
-def first_plan(
+def make_plan(
     kept: Kept,
     angles: tuple[float, float],
     search: Search,

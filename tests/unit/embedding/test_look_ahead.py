@@ -36,9 +36,9 @@ from template_control.embedding.planners.look_ahead import (
     SMALL,
     STATES,
     begin,
-    first_plan,
     knee_moment,
     look_ahead,
+    make_plan,
     new_problem,
     roughness,
     step_controls,
@@ -158,7 +158,7 @@ def test_a_plan_in_one_call_is_that_of_three(judged):
     cost, excess, p, x = plan_from(z, 0.9)
     y = np.empty_like(x)
     rough = roughness(p, x, 0) if judged[0] > excess else 0.0
-    assert first_plan(keep(p), ANY_ANGLE, SEARCH, judged, y) == (cost, excess, rough)
+    assert make_plan(keep(p), ANY_ANGLE, SEARCH, judged, y) == (cost, excess, rough)
     np.testing.assert_array_equal(y, x)
 
 
