@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from math import asin, atan2, hypot, inf, isnan, pi
+from math import inf, isnan, pi
 from typing import NamedTuple
 
 import numpy as np
@@ -29,14 +29,16 @@ from template_control.slip.automaton.hybrid import Automaton, Node
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Outcome, Slot
 from template_control.slip.control.least_squares import Search
 from template_control.slip.control.stride_solver import Prior, StrideEnd, solve_stride
+from template_control.slip.control.touchdown import (
+    ballistic_touchdown_angle,
+    touchdown_angle_after,
+)
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait, uncontrolled
 from template_control.slip.maps.section import REST, section_of
-from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, RATE_SQUARED, Scale
 
-_NEWTON = 4
 _AT_ONCE = 2e-3  # [s] from its start: no path comes to an event at which it begins
 _ROUNDS = 3  # of interpolation
 
@@ -72,39 +74,6 @@ def free_controls(automaton: Automaton, node: Node) -> list[int]:
     """Slots of the stiffnesses on which the rest of a stride depends, from a node on."""
     later = automaton.stride(node.name)
     return sorted({int(k) for n in later for k in (n.rear, n.front) if k is not None})
-
-
-def touchdown_angle_after(
-    sensed: TemplateState, parameters: SlipParameters, stiffness: float, time: float
-) -> float:
-    """Touchdown angle of a front leg that comes to l0 ``time`` [s] from now [rad].
-
-    By the Taylor series of the height to the second order; a leg of a stiffness [N/m] stands.
-    """
-    x, y, _, dy = sensed.state.tolist()
-    length = parameters.rest_length
-    stretch = length / hypot(x - float(sensed.toes[0]), y) - 1.0
-    lift = stiffness * stretch * y / parameters.mass - parameters.gravity
-    later = y + time * (dy + 0.5 * time * lift)
-    return asin(min(max(later / length, 0.0), 1.0))
-
-
-def ballistic_touchdown_angle(sensed: TemplateState, parameters: SlipParameters) -> float:
-    """Angle of the template's leg as it comes to l0 on the ballistic path through the robot [rad].
-
-    ``sensed`` is the robot as its rear foot meets the ground, which is a little before or after.
-    """
-    x, y, dx, dy = sensed.state.tolist()
-    x -= float(sensed.toes[0])
-    time = 0.0
-    for _ in range(_NEWTON):
-        px, py, speed = x + dx * time, y + dy * time - 0.5 * parameters.gravity * time**2, dy
-        speed -= parameters.gravity * time
-        slope = 2.0 * (px * dx + py * speed)
-        if slope >= 0.0:
-            break
-        time -= (px**2 + py**2 - parameters.rest_length**2) / slope
-    return atan2(py, -px)
 
 
 def choose_legs(
@@ -201,9 +170,8 @@ def reachable_angles(rollout: TemplateRollout, s: Situation) -> tuple[float, flo
         step = planners.of(s.goal).gait.step_duration
         soonest = min(SOONEST * rollout.scale.time, SOONEST_SHARE * step)
         time, stiffness = max(min(s.to_go, soonest), _AT_ONCE), float(u[s.node.rear])
-        most = min(
-            most, touchdown_angle_after(s.sensed, planners.route.parameters, stiffness, time)
-        )
+        where = s.sensed.state, s.sensed.toes, planners.route.parameters
+        most = min(most, touchdown_angle_after(*where, stiffness, time))
     return min(angle - change, most), most
 
 
@@ -244,7 +212,8 @@ def _after_touchdown(rollout: TemplateRollout, s: Situation) -> Decision | None:
     decision = choose_stiffnesses(rollout, s)
     if decision is not None:
         return decision
-    angle = ballistic_touchdown_angle(s.sensed, rollout.planners.route.parameters)
+    p = rollout.planners.route.parameters
+    angle = ballistic_touchdown_angle(s.sensed.state, s.sensed.toes, p)
     if not 0.0 < angle < pi:
         return None  # of a robot that falls: the CoM is below the foot
     start = rollout.automaton.start(s.goal.stride)

@@ -16,8 +16,6 @@ from template_control.embedding.planners.gait_table import (
     CONTROL,
     CONTROL_TOLERANCE,
     CONTROLS,
-    COST,
-    SETTLING,
     STATE,
     STATE_TOLERANCE,
     STEP_DURATION,
@@ -30,8 +28,9 @@ from template_control.embedding.planners.gait_table import (
 )
 from template_control.embedding.planners.look_ahead import (
     DEFECT,
+    DEGREE,
     SEARCH,
-    STATES,
+    TOLERANCE,
     TOO_SHORT,
     PlanCosts,
     PlanProblem,
@@ -49,10 +48,12 @@ from template_control.embedding.planners.planner import ANY_ANGLE, Context, Deci
 from template_control.embedding.planners.speed_changes import SpeedChange, speed_changes
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.control.least_squares import Search
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED, VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import Route
@@ -68,11 +69,12 @@ SWING = 0.155
 SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
-_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change of speed, tried in turn
+# Of the wanted change of speed, tried in turn; the first not where changes of the table were.
+_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)
 _HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
-_EFFORT = 16  # linearisations of plans, after which no other change of the table is tried
+_EFFORT = 12  # linearisations of plans, after which no other change of the table is tried
 _OFF = 2.0  # tolerances off a gait, up to which the plan is one near it
-_BEARABLE = 3.0  # excess of a plan near a change of speed at most
+_BEARABLE = 3.0  # excess up to which the first plan that has no more is taken
 _DEAREST = 60.0  # and its cost
 _NEVER = -1.0, 0.0  # excess and cost up to which a step's roughness counts where none is rough
 _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2, others up to 0.5
@@ -145,7 +147,7 @@ class _Plan(NamedTuple):
     excess: float
     roughness: float  # of its first step; 0 where it does not count
     speed: float  # dx/dt at VLO of the gait that it leads to [m/s]
-    controls: Array  # (6,) of its first step
+    first: tuple[Array, float]  # controls of its first step, as of :func:`.step_controls`
     end: Array  # (3,) of its first step
     changes: bool  # its speed, from one gait to another one, and is not yet in its last step
 
@@ -201,7 +203,7 @@ class AheadPlanner(Planner):
             o = self.options = replace(o, changes=0, pace=pace)
         self._costs = plan_costs(parameters, o, self.limits)
         self._problems: dict[int, tuple[PlanProblem, Kept]] = {}
-        self._changes = speed_changes(parameters)
+        self._changes, self._map = speed_changes(parameters), ReturnMap(parameters, STRIDE)
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._lead_to(self._first)
         self._lqr = LqrPlanner(self.gait)
@@ -248,7 +250,7 @@ class AheadPlanner(Planner):
         present = min(max(float(z[0]), low), high)
         aim = float(np.clip(wanted, *self.limits.speeds))
         change = min(max(aim - present, -o.pace), o.pace)
-        rough: _Plan | None = None
+        next_best: _Plan | None = None
         price, effort = np.inf, 0
         for goal, way in self._towards(z, aim):
             if effort >= _EFFORT:
@@ -258,10 +260,10 @@ class AheadPlanner(Planner):
             if plan.excess > _BEARABLE or plan.cost > _DEAREST:
                 continue
             if plan.roughness <= _ROUGHEST:
-                return self._begin(plan, wanted)
-            if rough is None or plan.price < price:
-                rough, price = plan, plan.price
-        aims = list(dict.fromkeys(present + share * change for share in _SHARES))
+                return self._begin(plan, z, wanted)
+            if next_best is None or plan.price < price:
+                next_best, price = plan, plan.price
+        aims = list(dict.fromkeys(present + share * change for share in _SHARES[effort > 0 :]))
         begun_to = None
         if begun is not None and begun.nominal:
             # The VLO from which the template would have come here has the speed that the legs'
@@ -270,23 +272,25 @@ class AheadPlanner(Planner):
             aims.insert(0, begun_to)
         cheapest: _Plan | None = None
         dearest = o.dearest or np.inf
-        judged = _NEVER if rough is None else (o.cheap, dearest)
+        judged = _NEVER if next_best is None else (o.cheap, dearest)
         for speed in aims:
             hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
             plan = self._look(context, speed, None, SEARCH._replace(hopeless=hopeless), judged)
             if plan.excess <= o.cheap and plan.cost <= dearest and plan.price < price:
-                return self._begin(plan, wanted)
+                if plan.excess <= _BEARABLE:
+                    return self._begin(plan, z, wanted)
+                next_best, price = plan, plan.price
             if plan.cost < (np.inf if cheapest is None else cheapest.cost):
                 cheapest = plan
-        if rough is not None:
-            return self._begin(rough, wanted)
+        if next_best is not None:
+            return self._begin(next_best, z, wanted)
         # No plan is cheap: the search's step, or the cheapest plan's if that is better.
         speed = min(max(self._spacing * round(float(z[0]) / self._spacing), low), high)
         decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
         if decision.lasting or cheapest is None:
             self._lead_to(float(self._lqr.gait.vlo[0]))
             return replace(decision, nominal=False, accepted=self._speed)
-        return replace(self._begin(cheapest, wanted), nominal=False)
+        return replace(self._begin(cheapest, z, wanted), nominal=False)
 
     def _towards(self, z: Array, aim: float) -> Iterator[tuple[float, SpeedChange]]:
         """Changes of speed that may lead from a VLO state near a speed [m/s], and where they lead.
@@ -317,40 +321,39 @@ class AheadPlanner(Planner):
         if steps not in self._problems:
             problem = new_problem(self._costs, steps)
             self._problems[steps] = problem, keep(problem)
-        (p, kept), row = self._problems[steps], row_at(self.table, speed)
-        target = row[STATE:COST] + row[SETTLING:STEP_DURATION].reshape(-1, STATES) @ self.offset
+        p, kept = self._problems[steps]
         p.start[:], p.offset[:], p.linearised[0] = context.z, self.offset, 0
         lifted, due = context.lifted, context.due
         if 0.0 < due < np.inf:
             # The quickest swing brings the foot as far as it is in as large a share of its time.
             lifted = min(lifted, self.limits.swing * lifted / (lifted + due))
         p.lifted[0] = lifted
-        states, free, stiffness, end, factor = p.reference
-        end[:], factor[:] = target[:STATES], np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))
-        if change is None:
-            states[:], free[:], stiffness[:] = target[:STATES], target[STATES:], row[STIFFNESS]
-        else:
+        states, free, stiffness, *_ = p.reference
+        if change is not None:
             states[:], free[:], stiffness[:] = change.states[1:], change.controls, change.stiffness
         x, (least, most) = np.empty(len(p.lower)), context.angles
-        angles = float(least), float(most)
-        cost, excess, error = make_plan(kept, angles, search, judged, x)
+        goal, angles = (speed, change is None), (float(least), float(most))
+        cost, excess, error = make_plan(kept, goal, angles, search, judged, x)
         return _Plan(
             effort=int(p.linearised[0]),
             cost=float(cost),
             excess=float(excess),
             roughness=float(error),
             speed=speed,
-            controls=step_controls(x[:CONTROLS], stiffness[0]),
+            first=(x[:CONTROLS], float(stiffness[0])),
             end=p.ends[0].copy(),
             changes=change is not None and steps > 1,
         )
 
-    def _begin(self, plan: _Plan, wanted: float) -> Decision:
+    def _begin(self, plan: _Plan, z: Array, wanted: float) -> Decision:
         """The first step of a plan; of a change of speed it accepts as much as the step does."""
-        self._lead_to(plan.speed)
-        speed = float(plan.end[0]) if plan.changes else plan.speed
-        accepted = None if speed == wanted else speed
-        return Decision(plan.controls, plan.end, True, True, True, accepted)
+        if plan.speed != self._speed:
+            self._lead_to(plan.speed)
+        u = step_controls(*plan.first)
+        end, outcome = self._map.step(z, u)  # the plan's is not exact
+        end = end + self.offset if outcome is Outcome.SECTION else plan.end
+        speed = float(end[0]) if plan.changes else plan.speed
+        return Decision(u, end, True, True, True, None if speed == wanted else speed)
 
     def observe(self, decision: Decision, z: Array) -> None:
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
@@ -363,7 +366,8 @@ def plan_costs(parameters: SlipParameters, options: AheadOptions, limits: WalkLi
     scale = Scale.of(parameters)
     beyond, tolerance = RISE
     return PlanCosts(
-        kernel=stride_kernel(parameters, STRIDE),
+        kernel=stride_kernel(parameters, STRIDE)._replace(degree=DEGREE, tolerance=TOLERANCE),
+        table=gait_table(parameters),
         defect=DEFECT * scale.state,
         tolerance=STATE_TOLERANCE * scale.state,
         control_tolerance=options.ease * CONTROL_TOLERANCE,
@@ -382,7 +386,7 @@ def plan_ahead() -> None:
     """The compiled plan, so that a helper process can compile it."""
     costs = plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0))
     problem = new_problem(costs, 1)
-    make_plan(keep(problem), ANY_ANGLE, SEARCH, _NEVER, np.ones(CONTROLS))
+    make_plan(keep(problem), (1.0, True), ANY_ANGLE, SEARCH, _NEVER, np.ones(CONTROLS))
 
 
 AHEAD = (Part(plan_ahead, 10.0),)

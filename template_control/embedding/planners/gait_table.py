@@ -9,9 +9,9 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions, settling_map
+from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions
 from template_control.slip.automaton.vocabulary import Slot, StrideKind
-from template_control.slip.control.lqr import lqr
+from template_control.slip.control.lqr import lqr, settling_map
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WALKING_SLOTS
 from template_control.slip.gaits.walking_by_speed import Chain, walking_by_speed
@@ -24,8 +24,8 @@ CONTROLS = 4
 """Controls of a step: alpha, kappa_1, kappa_2, kappa_p."""
 STIFFNESS, STATE, CONTROL = 0, 1, 4
 """Places in a row: k [N/m]; (3,) VLO state; (4,) alpha and shares of k."""
-COST, SETTLING = 8, 17
-"""Places in a row: (3, 3) cost-to-go; (7, 3) shift of state and controls by an offset."""
+FACTOR, SETTLING = 8, 17
+"""Places in a row: (3, 3) L, L L' the cost-to-go; (7, 3) shift of state, controls by an offset."""
 STEP_DURATION, STEP_LENGTH = 38, 39
 """Places in a row: duration [s] and length [m] of a step."""
 WIDTH = 40
@@ -115,9 +115,9 @@ def _rows(chain: Chain, p: SlipParameters) -> Array:
         result, slopes, _ = step.derivatives(z, u, COLUMNS)
         units = np.array([1.0, *[k] * (CONTROLS - 1)])
         a, b = slopes[:3, :3].copy(), slopes[:3, 3:] * units
-        row[STIFFNESS], row[STATE:CONTROL], row[CONTROL:COST] = k, z, u[SLOTS] / units
+        row[STIFFNESS], row[STATE:CONTROL], row[CONTROL:FACTOR] = k, z, u[SLOTS] / units
         row[STEP_LENGTH] = result[PADDED]
         row[STEP_DURATION] = row[STEP_LENGTH] / (chain.mean_speed[i] * unit)
-        row[COST:SETTLING] = lqr(a, b, q, r)[0].ravel()
+        row[FACTOR:SETTLING] = np.linalg.cholesky(lqr(a, b, q, r)[0]).ravel()
         row[SETTLING:STEP_DURATION] = settling_map(a, b, tolerance, CONTROL_WEIGHT).ravel()
     return rows

@@ -20,16 +20,33 @@ import numpy as np
 
 from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled, inner, inner_by_type
-from template_control.embedding.planners.gait_table import CONTROLS, SLOTS, STATE_TOLERANCE
+from template_control.embedding.planners.gait_table import (
+    CONTROLS,
+    FACTOR,
+    SETTLING,
+    SLOTS,
+    STATE,
+    STATE_TOLERANCE,
+    STIFFNESS,
+    WIDTH,
+    GaitTable,
+    gait_row,
+)
 from template_control.embedding.planners.lqr import ANGLE_RANGE
-from template_control.embedding.planners.step_search import steepest
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
-from template_control.slip.control.least_squares import Search, evaluate, least_squares, slopes
+from template_control.slip.control.broyden import LinearMap, carried
+from template_control.slip.control.least_squares import (
+    Search,
+    copy,
+    evaluate,
+    least_squares,
+    slopes,
+)
 from template_control.slip.control.stride_solver import of_type
+from template_control.slip.control.touchdown import steepest
 from template_control.slip.dynamics.kernel import scratch_of
 from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
-    FULL_DEGREE,
     LANDING_TIME,
     LIFTED_TIME,
     REAR_BOTTOM,
@@ -46,14 +63,13 @@ BOUNDS = np.array([[ANGLE_RANGE[0], 0.35, 0.35, 0.35], [ANGLE_RANGE[1], 1.5, 1.5
 
 What a softer leg does to the knees is a limit of its own here; with 0.5 speeds change later.
 """
+DEGREE, TOLERANCE = 10, 1e-6
+"""Of the series of a plan's steps: off by 3e-5 m/s and 3e-6 m at most, in half the time."""
 STATES = 3
 """Of a section at VLO."""
 BLOCK = CONTROLS + STATES
 """Unknowns of a step: its controls, and the state after it."""
 _KNEES = 5
-# Degree of the tangents' series in a search: 0.2 % of a column's largest derivative at most, and
-# 0.01 % from 0.75 m/s on, for half the time of the path's degree.
-_DEGREE = np.int64(10)
 _STATE, _CONTROL = STATES, 2 * STATES
 _RISE = _CONTROL + CONTROLS
 _KNEE = _RISE + 1
@@ -69,6 +85,7 @@ DEFECT = np.array([0.004, 0.0008, 0.008])
 """Differences between a step's end and the next one's start that cost 1, for the reference."""
 SMALL = np.array([0.03, 0.003, 0.04])
 """Changes of a state over which a step is to be nearly linear, for the reference."""
+_LENGTH = 0.004  # of a leg's reach, by which a knee's moment changes by about as much as costs 1
 SEARCH = Search(rounds=8, close=0.03, grid=0, save=0.02, damping=1e-3)
 """Gauss-Newton steps of a plan."""
 
@@ -77,6 +94,7 @@ class PlanCosts(NamedTuple):
     """Model and costs of every plan."""
 
     kernel: Kernel  # the step
+    table: GaitTable  # of the gaits that plans lead to
     defect: Array  # (3,) differences between a step's end and the next one's start that cost 1
     tolerance: Array  # (3,) differences of the states that cost 1
     control_tolerance: Array  # (4,) differences of alpha [rad] and of the shares that cost 1
@@ -115,10 +133,16 @@ class PlanProblem(NamedTuple):
     change: Array
     lower: Array
     upper: Array
-    z: Array  # (3,), and the next three: of the step at hand
-    u: Array
-    result: Array
-    jacobian: Array
+    place: Array  # (N, 7) state and controls of each step as it was run last
+    result: Array  # (N, RESULTS) where that led
+    known: IntArray  # (N,) whether there are some, which the next three are
+    jacobian: Array  # (N, RESULTS, 7)
+    before: Array  # (N, 7) the place that they are about
+    led: Array  # (N, RESULTS) where it led from there
+    unit: Array  # (7,) changes of state and controls that count alike
+    close: Array  # (RESULTS,) errors of them by which they may not be off
+    u: Array  # (NUM_SLOTS,) of the step at hand
+    row: Array  # (WIDTH,) of the table
     work: MapWorkspace
 
 
@@ -127,6 +151,7 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
     size, controls = BLOCK * steps - STATES, np.empty((steps, CONTROLS))
     states, square = np.empty((steps, STATES)), np.empty((STATES, STATES))
     change = np.tile([*costs.control_tolerance, *costs.tolerance], steps)[:size]
+    length = _LENGTH * costs.knee_reach
     return PlanProblem(
         costs=costs,
         start=np.empty(STATES),
@@ -140,10 +165,16 @@ def new_problem(costs: PlanCosts, steps: int) -> PlanProblem:
         change=change,
         lower=np.full(size, -np.inf),
         upper=np.full(size, np.inf),
-        z=np.empty(STATES),
+        place=np.empty((steps, BLOCK)),
+        result=np.empty((steps, RESULTS)),
+        known=np.empty(steps, np.int64),
+        jacobian=np.empty((steps, RESULTS, BLOCK)),
+        before=np.empty((steps, BLOCK)),
+        led=np.empty((steps, RESULTS)),
+        unit=np.concatenate((costs.tolerance, costs.control_tolerance)),
+        close=np.array([*costs.defect, np.inf, *3 * [length], *2 * [costs.short]]),
         u=np.zeros(NUM_SLOTS),
-        result=np.empty(RESULTS),
-        jacobian=np.empty((RESULTS, BLOCK)),
+        row=np.empty(WIDTH),
         work=new_workspace(steps),
     )
 
@@ -160,23 +191,30 @@ def _load(p: PlanProblem, x: Array, i: int) -> None:
     """Write state and controls of step ``i`` where its stride reads them."""
     first, k = BLOCK * i, p.reference.stiffness[i]
     for j in range(STATES):
-        p.z[j] = p.start[j] if i == 0 else x[first - STATES + j]
+        p.place[i, j] = p.start[j] if i == 0 else x[first - STATES + j]
     for j in range(CONTROLS):
+        p.place[i, STATES + j] = x[first + j]
         p.u[SLOTS[j]] = x[first + j] * (1.0 if j == 0 else k)
 
 
 @inner
 def _step(p: PlanProblem, i: int) -> int:
-    """Run step ``i`` from ``p.z`` with ``p.u``; returns the Outcome's value."""
+    """Run step ``i``, loaded last; returns the Outcome's value."""
     scratch = scratch_of(p.work.scratch, i)
-    return recorded_stride(p.costs.kernel, p.z, p.u, scratch, p.result)
+    return recorded_stride(p.costs.kernel, p.place[i, :STATES], p.u, scratch, p.result[i])
 
 
 @inner
-def _linearise(p: PlanProblem, i: int, degree: int) -> None:
-    """Write the derivatives of step ``i`` as it was run last into ``p.jacobian``."""
-    work = MapWorkspace(scratch_of(p.work.scratch, i), p.work.tangents)
-    recorded_jacobian(p.costs.kernel, p.u, p.costs.columns, degree, work, p.jacobian)
+def _linearise(p: PlanProblem, i: int) -> None:
+    """Write the derivatives of step ``i``, loaded and run last, into ``p.jacobian``."""
+    work, jacobian = MapWorkspace(scratch_of(p.work.scratch, i), p.work.tangents), p.jacobian[i]
+    recorded_jacobian(p.costs.kernel, p.u, p.costs.columns, work, jacobian)
+    for r in range(RESULTS):
+        for j in range(STATES + 1, BLOCK):
+            jacobian[r, j] *= p.reference.stiffness[i]
+    copy(p.place[i], p.before[i])
+    copy(p.result[i], p.led[i])
+    p.known[i] = 1
 
 
 @compiled
@@ -210,10 +248,10 @@ def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
             if _step(p, i) != 0:
                 return np.inf
             for j in range(STATES):
-                p.ends[i, j] = p.result[j] + p.offset[j]
+                p.ends[i, j] = p.result[i, j] + p.offset[j]
             for j in range(3):
-                p.lengths[i, j] = p.result[REAR_BOTTOM + j]
-            p.lengths[i, 3], p.lengths[i, 4] = p.z[1], p.ends[i, 1]
+                p.lengths[i, j] = p.result[i, REAR_BOTTOM + j]
+            p.lengths[i, 3], p.lengths[i, 4] = p.place[i, 1], p.ends[i, 1]
             for j in range(STATES):
                 residual[row + j] = residual[row + _STATE + j] = 0.0
                 if last:
@@ -234,7 +272,8 @@ def _plan_evaluate(problem: Any, x: Any, residual: Any) -> Any:
                 beyond = knee_moment(p, x, i, leg)[0] / c.knee_moment - 1.0
                 residual[row + _KNEE + leg] = max(beyond, 0.0) / _KNEE_TOLERANCE
             least = max(c.swing - p.lifted[i], c.earliest)
-            p.short[i], p.lifted[i + 1] = least - p.result[LANDING_TIME], p.result[LIFTED_TIME]
+            p.short[i] = least - p.result[i, LANDING_TIME]
+            p.lifted[i + 1] = p.result[i, LIFTED_TIME]
             residual[row + _SHORT] = max(p.short[i], 0.0) / c.short
         for r in range(PER_STEP * steps):
             total += residual[r] * residual[r]
@@ -256,40 +295,40 @@ def _plan_slopes(problem: Any, x: Any, rows: Any) -> Any:
         for i in range(steps):
             first, row, last = BLOCK * i, PER_STEP * i, i == steps - 1
             _load(p, x, i)
-            _linearise(p, i, _DEGREE)
+            jacobian, linear = p.jacobian[i], LinearMap(p.jacobian[i], p.before[i], p.led[i])
+            if not (p.known[i] and carried(linear, p.place[i], p.result[i], p.unit, p.close)):
+                _linearise(p, i)
             rising = 1.0 if p.ends[i, 2] > 0.0 else -1.0
             # The present state is what it is.
             for column in range(STATES if i == 0 else 0, BLOCK):
                 place = first - STATES + column
-                unit = reference.stiffness[i] if column > STATES else 1.0
                 for j in range(STATES):
                     if last:
                         for k in range(j, STATES):
-                            slope = reference.factor[k, j] * p.jacobian[k, column]
-                            rows[row + j, place] += slope * unit
+                            rows[row + j, place] += reference.factor[k, j] * jacobian[k, column]
                     else:
-                        rows[row + j, place] = p.jacobian[j, column] * unit / c.defect[j]
+                        rows[row + j, place] = jacobian[j, column] / c.defect[j]
                 if abs(p.ends[i, 2]) > c.rise[0]:
-                    rows[row + _RISE, place] = rising * p.jacobian[2, column] * unit / c.rise[1]
+                    rows[row + _RISE, place] = rising * jacobian[2, column] / c.rise[1]
                 for leg in range(_KNEES):
                     moment, by_length, stiff = knee_moment(p, x, i, leg)
                     if moment <= c.knee_moment:
                         continue
                     if leg < 3:
-                        slope = by_length * p.jacobian[REAR_BOTTOM + leg, column] * unit
+                        slope = by_length * jacobian[REAR_BOTTOM + leg, column]
                     elif leg == 3:
                         slope = by_length if column == 1 else 0.0
                     else:
-                        slope = by_length * p.jacobian[1, column] * unit
+                        slope = by_length * jacobian[1, column]
                     if column == STATES + stiff:
                         slope += moment / x[first + stiff]
                     rows[row + _KNEE + leg, place] = slope / (_KNEE_TOLERANCE * c.knee_moment)
                 if p.short[i] > 0.0:
-                    rows[row + _SHORT, place] = -p.jacobian[LANDING_TIME, column] * unit / c.short
+                    rows[row + _SHORT, place] = -jacobian[LANDING_TIME, column] / c.short
                 # Where the whole swing is too short, it may also begin sooner.
                 whole = c.swing - p.lifted[i + 1] > c.earliest
                 if not last and whole and p.short[i + 1] > 0.0:
-                    slope = -p.jacobian[LIFTED_TIME, column] * unit / c.short
+                    slope = -jacobian[LIFTED_TIME, column] / c.short
                     rows[row + PER_STEP + _SHORT, place] = slope
             for j in range(CONTROLS):
                 rows[row + _CONTROL + j, first + j] = 1.0 / c.control_tolerance[j]
@@ -338,6 +377,7 @@ def look_ahead(problem: PlanProblem, search: Search, x: Array) -> tuple[float, f
     complete the steps that the search begins with.
     """
     residual, excess = np.empty(PER_STEP * problem.ends.shape[0]), 0.0
+    problem.known[:] = 0
     cost = least_squares(problem, search, residual, x)
     if cost == np.inf:
         return np.inf, np.inf
@@ -357,40 +397,66 @@ def roughness(p: PlanProblem, x: Array, i: int) -> float:
     c, worst, ends = p.costs, 0.0, np.empty((STATES, 2, STATES))
     _load(p, x, i)
     for k in range(STATES):
-        at = p.z[k]
+        at = p.place[i, k]
         for side in range(2):
-            p.z[k] = at + (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
+            p.place[i, k] = at + (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
             outcome = _step(p, i)
-            p.z[k] = at
+            p.place[i, k] = at
             if outcome != 0:
                 return np.inf
             for j in range(STATES):
-                ends[k, side, j] = p.result[j]
+                ends[k, side, j] = p.result[i, j]
     _step(p, i)
-    _linearise(p, i, FULL_DEGREE)
+    _linearise(p, i)
     for k in range(STATES):
         for side in range(2):
             change = (1.0 - 2.0 * side) * (SMALL[k] * c.unit[k])
             for j in range(STATES):
-                miss = ends[k, side, j] - p.result[j] - p.jacobian[j, k] * change
+                miss = ends[k, side, j] - p.result[i, j] - p.jacobian[i, j, k] * change
                 worst = max(worst, abs(miss) / (STATE_TOLERANCE[j] * c.unit[j]))
     return worst
 
 
 @compiled
+def lead_to(p: PlanProblem, speed: float, near: bool) -> None:
+    """Let the plan lead to the gait with a speed at VLO [m/s], shifted for the robot's offset.
+
+    All its steps stay ``near`` that gait, or near the reference so far.
+    """
+    row, reference = p.row, p.reference
+    gait_row(p.costs.table, speed, row)
+    for j in range(BLOCK):
+        wish = row[STATE + j]
+        for i in range(STATES):
+            wish += row[SETTLING + STATES * j + i] * p.offset[i]
+        if j < STATES:
+            reference.end[j] = wish
+            for i in range(STATES):
+                reference.factor[j, i] = row[FACTOR + STATES * j + i]
+        for i in range(p.ends.shape[0] if near else 0):
+            reference.stiffness[i] = row[STIFFNESS]
+            if j < STATES:
+                reference.states[i, j] = wish
+            else:
+                reference.controls[i, j - STATES] = wish
+
+
+@compiled
 def make_plan(
     kept: Kept,
+    goal: tuple[float, bool],
     angles: tuple[float, float],
     search: Search,
     judged: tuple[float, float],
     x: Array,
 ) -> tuple[float, float, float]:
-    """:func:`begin`, :func:`look_ahead` and the first step's :func:`roughness`, in one call.
+    """:func:`lead_to` a goal, :func:`begin`, :func:`look_ahead` and the first step's roughness.
 
-    ``kept`` is the :class:`PlanProblem`. Returns the cost, the excess and the roughness, which is 0
-    where excess or cost are more than ``judged``.
+    ``kept`` is the :class:`PlanProblem`, ``goal`` speed and ``near``. Returns the cost, the excess
+    and the roughness, which is 0 where excess or cost are more than ``judged``.
     """
     p, error = kept.value, 0.0
+    lead_to(p, *goal)
     begin(p, angles, x)
     cost, excess = look_ahead(p, search, x)
     if excess <= judged[0] and cost <= judged[1]:

@@ -34,7 +34,7 @@ from template_control.embedding.planners.step_search import (
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search
-from template_control.slip.control.lqr import lqr
+from template_control.slip.control.lqr import lqr, settling_map
 from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
@@ -359,20 +359,3 @@ class LqrPlanner(Planner):
         limits = _SURPRISE_BOUND * unit, _OFFSET_BOUND * unit
         self.offset = learnt(self.offset, surprise, self.options.offset_gain, limits)
         self._aim(self._shift)
-
-
-def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
-    """(3 + c, 3) map from an offset d to the shift (dz, du) of the fixed point.
-
-    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d, with
-    A (3, 3) and B (3, c) the Jacobians of the VLO map. Without push-off the controls act in two
-    directions only, so not every offset can be cancelled with dz = 0.
-    """
-    weight = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
-    constraint, n = np.hstack((np.eye(3) - a, -b)), len(weight)
-    kkt = np.zeros((n + 3, n + 3))
-    kkt[:n, :n] = np.diag(weight)
-    kkt[n:, :n] = constraint
-    kkt[:n, n:] = constraint.T
-    solution = np.linalg.solve(kkt, np.vstack((np.zeros((n, 3)), np.eye(3))))
-    return np.asarray(solution[:n], dtype=np.float64)

@@ -16,6 +16,7 @@ from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
 from template_control.slip.control.least_squares import copy
+from template_control.slip.control.touchdown import steepest
 from template_control.slip.dynamics.kernel import Scratch, new_scratch
 from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
@@ -27,8 +28,6 @@ _FLIES = int(Outcome.UNWANTED_FLIGHT)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
 
-TOP_MARGIN = 0.01
-"""Distance of alpha below asin(y / l0), at which the foot would touch down at once [rad]."""
 # Where two steps end alike, the first weight favours the one nearer the gait half-way, the effort
 # the one with the gait's controls: no robot follows a step well whose legs are much softer.
 _FIRST_WEIGHT = 0.3  # of the cost-to-go after the first step, over that after the second
@@ -70,25 +69,6 @@ class Law(NamedTuple):
     knee_moment: float  # of the leg force about the knee from which on a step costs more [N m]
     knee_price: float  # of a moment that is twice as much
     kernel: Kernel  # the template's walking step
-
-
-@compiled
-def steepest(
-    z: Array, body: tuple[float, float, float], stiffness: float, earliest: float
-) -> float:
-    """Largest touchdown angle at a VLO state z (3,) [rad].
-
-    The foot is neither on the ground at once, nor ``earliest`` after VLO [s]: the height then comes
-    from its Taylor series to the second order. ``body`` are l0, m and g, the leg has a stiffness
-    [N/m].
-    """
-    length, mass, gravity = body
-    top = np.arcsin(min(z[1] / length, 1.0)) - TOP_MARGIN
-    if earliest > 0.0:
-        lift = stiffness / mass * (length - z[1]) - gravity
-        later = z[1] + earliest * (z[2] + 0.5 * earliest * lift)
-        top = min(top, np.arcsin(min(max(later / length, 0.0), 1.0)))
-    return float(max(top, TOP_MARGIN))
 
 
 @compiled

@@ -32,8 +32,6 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.similarity import Scale, scaled, tuned
 
 _LEGS = (Slot.K_SC, Slot.K_SD)  # of a gait, before and after the bottom
-
-
 TOLERANCE = np.array([0.05, 0.01, 0.1])
 """Errors of dx/dt, y, dy/dt at the end that count as 1 [m/s, m, m/s], of the reference."""
 _TOP_MARGIN = 0.005  # of alpha below asin(y / l0), at which the foot would touch down at once [rad]

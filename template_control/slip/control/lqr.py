@@ -1,4 +1,4 @@
-"""Discrete linear-quadratic regulator."""
+"""Discrete linear-quadratic regulator, and the fixed point that it leads to."""
 
 from __future__ import annotations
 
@@ -22,3 +22,20 @@ def lqr(a: Array, b: Array, q: Array, r: Array) -> tuple[Array, Array]:
     """
     cost = solve_discrete_are(a, b, q, r)
     return cost, np.linalg.solve(r + b.T @ cost @ b, b.T @ cost @ a)
+
+
+def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) -> Array:
+    """(3 + c, 3) map from an offset d to the shift (dz, du) of the fixed point.
+
+    Minimises |dz / tolerance|^2 + control_weight |du|^2 subject to (I - A) dz = B du + d, with
+    A (3, 3) and B (3, c) the Jacobians of the VLO map. Without push-off the controls act in two
+    directions only, so not every offset can be cancelled with dz = 0.
+    """
+    weight = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
+    constraint, n = np.hstack((np.eye(3) - a, -b)), len(weight)
+    kkt = np.zeros((n + 3, n + 3))
+    kkt[:n, :n] = np.diag(weight)
+    kkt[n:, :n] = constraint
+    kkt[:n, n:] = constraint.T
+    solution = np.linalg.solve(kkt, np.vstack((np.zeros((n, 3)), np.eye(3))))
+    return np.asarray(solution[:n], dtype=np.float64)

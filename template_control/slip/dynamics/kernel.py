@@ -152,6 +152,7 @@ def run_stride(
     """
     tables, node = kernel.tables, kernel.node
     gravity, rest_length, max_time = kernel.gravity, kernel.rest_length, kernel.max_time
+    degree, tolerance = kernel.degree, kernel.tolerance
     cx, cy, meta, events = scratch[:4]
     work, out, stiffness, bends = scratch.work, scratch.out, scratch.stiffness, scratch.bends
     alpha = controls[0]
@@ -164,8 +165,8 @@ def run_stride(
             arm(watch, state, event)
             entered = False
         row = segments if record else 0
-        px, py = cx[row], cy[row]
-        physics = (kernel.mass, gravity, backward(kernel, stiffness), rest_length)
+        px, py = cx[row, : degree + 1], cy[row, : degree + 1]
+        physics = (kernel.mass, gravity, backward(kernel, stiffness), rest_length, tolerance)
         horizon = expand(state, toes, stiffness, physics, px, py, work)
         horizon = min(horizon, max_time - time, 0.1 * np.sqrt(rest_length / gravity) * _SUBSTEPS)
         all_bends(state, toes, rest_length, steepest(px, py, horizon), horizon, bends)

@@ -18,6 +18,12 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton, Tables
 from template_control.slip.parameters import SlipParameters
 
+ORDER = 16
+"""Degree of the polynomials."""
+
+TOLERANCE = 1e-13
+"""Size of the last terms relative to the rest length; sets the step."""
+
 
 class Kernel(NamedTuple):
     """A kind of stride of one template: the packed automaton, the physics, and the first node."""
@@ -30,6 +36,8 @@ class Kernel(NamedTuple):
     rest_length: float  # l0 [m]
     max_time: float  # a stride that takes longer counts as failed [s]
     node: int  # index of the first node
+    degree: int = ORDER  # of the polynomials
+    tolerance: float = TOLERANCE  # size of their last terms, over the rest length
 
 
 def node_kernel(
@@ -57,32 +65,27 @@ def backward(kernel: Kernel, stiffness: Array) -> float:
     return kernel.along - kernel.assist
 
 
-ORDER = 16
-"""Degree of the polynomials."""
-
-TOLERANCE = 1e-13
-"""Size of the last terms relative to the rest length; sets the step."""
-
-
 @inner
 def expand(
     state: Array,
     toes: Array,
     stiffness: Array,
-    physics: tuple[float, float, float, float],
+    physics: tuple[float, float, float, float, float],
     cx: Array,
     cy: Array,
     work: Array,
 ) -> float:
     """Write the Taylor coefficients x(t) = sum cx[i] t^i of the CoM's path from ``state``, and y.
 
-    ``physics`` are m, gravity and :func:`backward` in this node, and l0: a call with the whole
-    kernel, 30 arguments for Numba, takes longer. Returns the step [s] within which the truncated
-    series are exact to ``TOLERANCE``; ``work`` (2, 4, ORDER + 1) is overwritten.
+    Of as many as there is room for. ``physics`` are m, gravity and :func:`backward` in this node,
+    l0 and the kernel's tolerance: a call with all of it, 30 arguments for Numba, takes longer.
+    Returns the step [s] within which the last terms are so small; ``work`` (2, 4, ORDER + 1) is
+    overwritten.
     """
-    mass, gravity, along, rest_length = physics
+    mass, gravity, along, rest_length, tolerance = physics
+    degree = cx.shape[0] - 1
     cx[0], cy[0], cx[1], cy[1] = state[0], state[1], state[2], state[3]
-    for n in range(ORDER - 1):
+    for n in range(degree - 1):
         ax = ay = 0.0
         if n == 0:
             ax, ay = ax - along, ay - gravity
@@ -114,10 +117,10 @@ def expand(
         cx[n + 2] = ax * scale
         cy[n + 2] = ay * scale
     step = np.inf
-    for n in (ORDER - 1, ORDER):
+    for n in (degree - 1, degree):
         size = max(abs(cx[n]), abs(cy[n])) / rest_length
         if size > 0.0:
-            step = min(step, (TOLERANCE / size) ** (1.0 / n))
+            step = min(step, (tolerance / size) ** (1.0 / n))
     return step
 
 
@@ -129,7 +132,7 @@ def steepest(cx: Array, cy: Array, step: float) -> tuple[float, float, float]:
     """
     acceleration = jerk = 0.0
     squared = step * step
-    for n in range(ORDER, 2, -2):  # by twos, for a shorter chain of products
+    for n in range(cx.shape[0] - 1, 2, -2):  # by twos, for a shorter chain of products
         even = n * (n - 1) * step * (abs(cx[n]) + abs(cy[n]))
         odd = (n - 1) * (n - 2) * (abs(cx[n - 1]) + abs(cy[n - 1]))
         acceleration = acceleration * squared + (even + odd)

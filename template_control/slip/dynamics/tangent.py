@@ -250,16 +250,15 @@ def _reset(reset: int, alpha: float, rest_length: float, tangents: Tangents) -> 
 
 
 @inner
-def stride_tangents(
-    kernel: Kernel, controls: Array, degree: int, scratch: Scratch, tangents: Tangents
-) -> None:
+def stride_tangents(kernel: Kernel, controls: Array, scratch: Scratch, tangents: Tangents) -> None:
     """Derivatives of a stride that :func:`~.kernel.run_stride` has recorded in ``scratch``.
 
     ``state``, ``toes``, ``lengths`` and ``times`` of ``tangents`` are overwritten with the
     derivatives at the stride's end by dx/dt, y, dy/dt at its start, where x is 0, and by the
-    controls. ``degree`` is that of the tangents' series, :data:`.ORDER` for exact ones.
+    controls, along series of the kernel's degree.
     """
     tables, alpha, rest_length = kernel.tables, controls[0], kernel.rest_length
+    degree = kernel.degree
     body = kernel.mass, rest_length
     tangents.state[:] = 0.0
     tangents.toes[:] = 0.0
@@ -269,7 +268,8 @@ def stride_tangents(
     tangents.state[2, 0] = tangents.state[1, 1] = tangents.state[3, 2] = 1.0
     segments, events, fired = scratch.recorded[0], scratch.recorded[1], 0
     for i in range(segments):
-        path, meta = Path(scratch.cx[i], scratch.cy[i]), scratch.meta[i]
+        path = Path(scratch.cx[i, : degree + 1], scratch.cy[i, : degree + 1])
+        meta = scratch.meta[i]
         step, node = meta[1], int(meta[2])
         rear, front = tables.rear[node], tables.front[node]
         if rear >= 0:

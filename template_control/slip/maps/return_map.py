@@ -16,7 +16,7 @@ from template_control.slip.automaton.hybrid import Automaton
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
 from template_control.slip.dynamics.closed_form import closed_form_stride
 from template_control.slip.dynamics.kernel import Scratch, new_scratch, run_stride
-from template_control.slip.dynamics.model import ORDER, Kernel, stride_kernel
+from template_control.slip.dynamics.model import Kernel, stride_kernel
 from template_control.slip.dynamics.stride import finite
 from template_control.slip.dynamics.tangent import Tangents, new_tangents, stride_tangents
 from template_control.slip.maps.section import PADDED, section_of
@@ -26,8 +26,6 @@ from template_control.slip.parameters import SlipParameters
 _LAST_ONLY, _RECORDED = np.bool_(False), np.bool_(True)
 EXACT = np.int64(MapKind.EXACT)
 """The exact map, for compiled code."""
-FULL_DEGREE = np.int64(ORDER)
-"""Degree of the tangents' series that makes derivatives exact to rounding."""
 _DIFFERENCE = 3e-6  # relative; leaves 1e-11 of the third derivative and 1e-9 of rounding
 
 RESULTS = 9
@@ -125,16 +123,12 @@ def recorded_jacobian(
     kernel: Kernel,
     controls: Array,
     columns: IntArray,
-    degree: int,
     work: MapWorkspace,
     jacobian: Array,
 ) -> None:
-    """Derivatives (RESULTS, c) of the stride that the scratch has recorded last.
-
-    ``degree`` is that of the tangents' series: their cost grows with its square.
-    """
+    """Derivatives (RESULTS, c) of the stride that the scratch has recorded last."""
     scratch, tangents = work
-    stride_tangents(kernel, controls, degree, scratch, tangents)
+    stride_tangents(kernel, controls, scratch, tangents)
     state, lengths, times = tangents.state, tangents.lengths, tangents.times
     for c in range(columns.shape[0]):
         j = columns[c]
@@ -210,7 +204,7 @@ def section_jacobian(
     if kind != EXACT:
         return _differences(kernel, kind, z, controls, columns, work, found)
     outcome = recorded_stride(kernel, z, controls, work.scratch, found.result)
-    recorded_jacobian(kernel, controls, columns, FULL_DEGREE, work, found.jacobian)
+    recorded_jacobian(kernel, controls, columns, work, found.jacobian)
     return outcome
 
 

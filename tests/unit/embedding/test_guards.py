@@ -19,7 +19,7 @@ from template_control.slip.dynamics.guards import (
     guard_rate,
     sample,
 )
-from template_control.slip.dynamics.model import ORDER, expand, steepest
+from template_control.slip.dynamics.model import ORDER, TOLERANCE, expand, steepest
 from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.parameters import SlipParameters
 
@@ -75,7 +75,8 @@ def test_bends_bound_the_second_derivatives_of_guards(position, velocity, toes, 
     assume(np.hypot(state[0] - toes, state[1]).min() > 0.6)
     x, y, bends = np.zeros(ORDER + 1), np.zeros(ORDER + 1), np.zeros(NUM_EVENTS)
     forces, work = P.mass * np.array(stiffness), np.zeros((2, 4, ORDER + 1))
-    step = min(expand(state, toes, forces, (P.mass, P.gravity, 0.0, L0), x, y, work), 0.03)
+    physics = P.mass, P.gravity, 0.0, L0, TOLERANCE
+    step = min(expand(state, toes, forces, physics, x, y, work), 0.03)
     all_bends(state, toes, L0, steepest(x, y, step), step, bends)
     times, out = np.linspace(0.0, step, 31), np.zeros(6)
     guards = []

@@ -20,7 +20,7 @@ from template_control.embedding.planners.ahead import (
 from template_control.embedding.planners.gait_table import (
     CONTROL,
     CONTROLS,
-    COST,
+    FACTOR,
     SETTLING,
     SLOTS,
     STATE,
@@ -45,13 +45,13 @@ from template_control.embedding.planners.look_ahead import (
 )
 from template_control.embedding.planners.lqr import KNEE_MOMENT
 from template_control.embedding.planners.planner import ANY_ANGLE, Cause, Context
-from template_control.embedding.planners.step_search import TOP_MARGIN
 from template_control.embedding.robot_template import walk_limits
 from template_control.errors import ScenarioError
 from template_control.run.summary import summarise
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome
 from template_control.slip.control.least_squares import Search
+from template_control.slip.control.touchdown import TOP_MARGIN
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
@@ -93,7 +93,7 @@ def problem_from(z, speed, steps=3, **changes):
     r = p.reference
     r.states[:], r.end[:] = row[STATE:CONTROL], row[STATE:CONTROL]
     r.controls[:], r.stiffness[:] = row[CONTROL : CONTROL + CONTROLS], row[STIFFNESS]
-    r.factor[:] = np.linalg.cholesky(row[COST:SETTLING].reshape(3, 3))
+    r.factor[:] = row[FACTOR:SETTLING].reshape(3, 3)
     x = np.empty(BLOCK * steps - STATES)
     begin(p, ANY_ANGLE, x)
     return p, x
@@ -116,7 +116,9 @@ def test_a_plan_is_where_its_cost_is_least(moment):
     """The derivatives are those of the cost: else Gauss and Newton's method ends elsewhere."""
     z = row_at(table(), 0.8)[STATE:CONTROL] + [0.03, 0.002, 0.16]
     fully = Search(rounds=60, close=1e-9, grid=0, damping=1e-3)
-    cost, _, p, x = plan_from(z, 0.9, search=fully, knee_moment=moment)
+    p, x = problem_from(z, 0.9, knee_moment=moment)
+    p.close[:] = 0.0  # no derivatives are carried
+    cost, _ = look_ahead(p, fully, x)
 
     def at(y):
         return look_ahead(p, Search(rounds=0, grid=0), y.copy())[0]
@@ -132,10 +134,24 @@ def test_a_plan_is_where_its_cost_is_least(moment):
     assert left < 0.1 * (at(far) - cost)
 
 
+@pytest.mark.parametrize("speed", [0.35, 0.8, 1.2])
+def test_carried_derivatives_lead_to_the_plan_of_new_ones(speed):
+    """To the least cost that many rounds with new ones find."""
+    z = row_at(table(), speed)[STATE:CONTROL] + [0.03, 0.002, 0.06]
+    cost, excess, p, x = plan_from(z, speed + 0.05)
+    anew, y = problem_from(z, speed + 0.05)
+    anew.close[:] = 0.0  # no error is small
+    least, _ = look_ahead(anew, Search(rounds=60, close=1e-9, grid=0, damping=1e-3), y)
+    assert least <= cost < 1.05 * least + 0.01
+    assert excess < 0.05
+    assert np.max(np.abs(x - y) / p.change) < 0.1
+    assert np.any(p.jacobian != anew.jacobian)
+
+
 @pytest.mark.parametrize("speed", [0.3, 0.8, 1.3])
 def test_roughness_is_what_the_linear_map_misses(speed):
     row, step = row_at(table(), speed), ReturnMap(P, "wp")
-    p, x = problem_from(row[STATE:CONTROL], speed)
+    p, x = problem_from(row[STATE:CONTROL], speed, kernel=step.kernel[0])
     z, u = p.start.copy(), controls_of(p, x)
     here = step.linearise(z, u)
     misses = [
@@ -145,6 +161,8 @@ def test_roughness_is_what_the_linear_map_misses(speed):
     expected = np.max(np.abs(misses) / STATE_TOLERANCE)
     assert roughness(p, x, 0) == pytest.approx(expected, rel=1e-6)
     assert roughness(p, x, 0) < 2.5
+    short, x = problem_from(row[STATE:CONTROL], speed)
+    assert roughness(short, x, 0) == pytest.approx(expected, abs=0.02)
 
 
 def test_a_step_that_another_state_does_not_complete_is_rough():
@@ -158,7 +176,9 @@ def test_a_plan_in_one_call_is_that_of_three(judged):
     cost, excess, p, x = plan_from(z, 0.9)
     y = np.empty_like(x)
     rough = roughness(p, x, 0) if judged[0] > excess else 0.0
-    assert make_plan(keep(p), ANY_ANGLE, SEARCH, judged, y) == (cost, excess, rough)
+    p.reference.end[:], p.reference.stiffness[:] = 0.0, 0.0  # of another plan
+    found = make_plan(keep(p), (0.9, True), ANY_ANGLE, SEARCH, judged, y)
+    assert found == (cost, excess, rough)
     np.testing.assert_array_equal(y, x)
 
 
