@@ -69,9 +69,9 @@ SWING = 0.155
 SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
-# Of the wanted change of speed, tried in turn; the first not where changes of the table were.
-_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)
+_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the change, in turn; the first if none of the table was
 _HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
+_NEAR_CHANGE = SEARCH._replace(hopeless=1000.0)  # given up above it after two rounds
 _EFFORT = 12  # linearisations of plans, after which no other change of the table is tried
 _OFF = 2.0  # tolerances off a gait, up to which the plan is one near it
 _BEARABLE = 3.0  # excess up to which the first plan that has no more is taken
@@ -255,7 +255,7 @@ class AheadPlanner(Planner):
         for goal, way in self._towards(z, aim):
             if effort >= _EFFORT:
                 break
-            plan = self._look(context, goal, way, SEARCH, (_BEARABLE, _DEAREST))
+            plan = self._look(context, goal, way, _NEAR_CHANGE, (_BEARABLE, _DEAREST))
             effort += plan.effort
             if plan.excess > _BEARABLE or plan.cost > _DEAREST:
                 continue

@@ -253,10 +253,8 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
     change = AGILITY * left**2
     # The foot needs some time until it is down, if it had so much.
     soonest = max(min(left, SOONEST, SOONEST_SHARE * gait.step_duration), 0.002)
-    most = min(
-        u[0] + change,
-        touchdown_angle_after(sensed.state, float(sensed.toes[0]), P, u[Slot.K_SC], soonest),
-    )
+    where = sensed.state, sensed.toes, P
+    most = min(u[0] + change, touchdown_angle_after(*where, u[Slot.K_SC], soonest))
     supervisor.replan(Cause.DEVIATION, node, sensed, later, phase_time=later)
     expected = LqrPlanner(gait).decide(Context(z, angles=(min(u[0] - change, most), most))).controls
     np.testing.assert_allclose(supervisor.decision.controls, expected, rtol=1e-6)
@@ -268,10 +266,8 @@ def test_a_disturbed_step_is_planned_from_the_vlo_it_seems_to_come_from(
 def test_a_leg_at_a_later_angle_lands_then(gait, time):
     node = STRIDE_START["w"]
     early = simulate_stride(P, node, VLO.state(gait.vlo), gait.controls).sample(0.05)[0][:4]
-    u = gait.controls.copy()
-    u[Slot.TOUCHDOWN_ANGLE] = (
-        touchdown_angle_after(early, np.zeros(2), P, u[Slot.K_SC], time) - 1e-9
-    )
+    u, toes = gait.controls.copy(), np.zeros(2)
+    u[Slot.TOUCHDOWN_ANGLE] = touchdown_angle_after(early, toes, P, u[Slot.K_SC], time) - 1e-9
     landed = simulate_stride(P, node, early, u).time_of(Event.TOUCHDOWN)
     assert landed == pytest.approx(time, abs=1e-6 + 2.0 * time**2), "the series ends there"
 
