@@ -135,12 +135,12 @@ class PlanProblem(NamedTuple):
     upper: Array
     place: Array  # (N, 7) state and controls of each step as it was run last
     result: Array  # (N, RESULTS) where that led
-    known: IntArray  # (N,) whether there are some, which the next three are
-    jacobian: Array  # (N, RESULTS, 7)
-    before: Array  # (N, 7) the place that they are about
-    led: Array  # (N, RESULTS) where it led from there
-    unit: Array  # (7,) changes of state and controls that count alike
-    close: Array  # (RESULTS,) errors of them by which they may not be off
+    known: IntArray  # (N,) whether the next three hold derivatives of the step
+    jacobian: Array  # (N, RESULTS, 7) about the place before
+    before: Array  # (N, 7) that place
+    led: Array  # (N, RESULTS) where it led
+    unit: Array  # (7,) changes of state and controls that count as 1
+    close: Array  # (RESULTS,) errors of the results that count as 1
     u: Array  # (NUM_SLOTS,) of the step at hand
     row: Array  # (WIDTH,) of the table
     work: MapWorkspace
