@@ -69,9 +69,9 @@ SWING = 0.155
 SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
-_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the change, in turn; the first if none of the table was
+_SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change; 1 only if no search near one failed
 _HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
-_NEAR_CHANGE = SEARCH._replace(hopeless=1000.0)  # given up above it after two rounds
+_NEAR_CHANGE = SEARCH._replace(hopeless=1000.0)  # search near a change of the table
 _EFFORT = 12  # linearisations of plans, after which no other change of the table is tried
 _OFF = 2.0  # tolerances off a gait, up to which the plan is one near it
 _BEARABLE = 3.0  # excess up to which the first plan that has no more is taken
