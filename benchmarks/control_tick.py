@@ -33,10 +33,10 @@ from template_control.embedding.free.options import FREE_PLANNER
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.robot_template import default_gait, template_for
 from template_control.plant.bullet import PlantOptions
 from template_control.robot.biped import Biped
 from template_control.robot.library import load_floating_robot, load_robot
+from template_control.robot.template import default_gait, template_for
 from template_control.run.experiment import Experiment
 from template_control.run.live import LiveRun
 from template_control.slip.gaits.gait import gait_at

@@ -16,10 +16,6 @@ from .embedding.planners.lqr import LqrOptions as LqrOptions
 from .embedding.planners.lqr import LqrPlanner as LqrPlanner
 from .embedding.planners.modified import ModifiedPlanner as ModifiedPlanner
 from .embedding.planners.running import RunningPlanner as RunningPlanner
-from .embedding.robot_template import default_gait as default_gait
-from .embedding.robot_template import robot_gait_for_speed as robot_gait_for_speed
-from .embedding.robot_template import template_for as template_for
-from .embedding.robot_template import walking_speeds as walking_speeds
 from .errors import TemplateControlError as TemplateControlError
 from .plant.bullet import PlantOptions as PlantOptions
 from .plant.ideal import IdealOptions as IdealOptions
@@ -31,6 +27,10 @@ from .robot.library import load_floating_robot as load_floating_robot
 from .robot.library import load_robot as load_robot
 from .robot.library import robots as robots
 from .robot.planar_biped import PlanarBiped as PlanarBiped
+from .robot.template import default_gait as default_gait
+from .robot.template import robot_gait_for_speed as robot_gait_for_speed
+from .robot.template import template_for as template_for
+from .robot.template import walking_speeds as walking_speeds
 from .run.experiment import Experiment as Experiment
 from .run.options import HeadingCommand as HeadingCommand
 from .run.options import Push as Push

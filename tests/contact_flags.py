@@ -1,6 +1,6 @@
 """Flags of contacts, tick by tick."""
 
-from template_control.embedding.contacts import DUE, NO_FORCE, update_contacts
+from template_control.estimation.contacts import DUE, NO_FORCE, update_contacts
 
 
 def take_in(contacts, flags, force, expected, dt):

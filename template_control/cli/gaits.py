@@ -21,7 +21,6 @@ from template_control.checks import option_types as values
 from template_control.checks import typed
 from template_control.checks.fitting import check
 from template_control.checks.ranges import Degrees, Positive, Range
-from template_control.embedding.planners.change_search import change_data, search_changes
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import MapKind, Slot, StrideKind
 from template_control.slip.control.controllers import (
@@ -44,6 +43,7 @@ from template_control.slip.gaits.gait_branch import ControlledFamily, Family
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX, VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.change_search import change_data, search_changes
 from template_control.storage import Files, writing
 from template_control.terminal import progress_bar, report, table
 from template_control.view.stability_figures import UNITS, branch_figure, speed_family_figure

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from template_control.checks import option_types as values
-from template_control.embedding.robot_template import default_gait
 from template_control.robot.library import ROBOTS, SHIPPED, load_floating_robot, load_robot
+from template_control.robot.template import default_gait
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.terminal import report, table
 

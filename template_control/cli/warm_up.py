@@ -6,17 +6,15 @@ import argparse
 
 import numpy as np
 
-from template_control.embedding.planners.ahead import AHEAD
 from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.planners.modified import ModifiedPlanner
-from template_control.embedding.pressure import PRESSURE
-from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.embedding.tick import CONTROL
 from template_control.estimation.delay import DELAY
 from template_control.plant.bullet import READ
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.robot.spec import RobotSpec
+from template_control.robot.template import paper_gait, template_for
 from template_control.run.experiment import Experiment
 from template_control.run.recorder import RECORD
 from template_control.run.simulation import simulate
@@ -28,6 +26,8 @@ from template_control.slip.gaits.gait import gait_at
 from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.look_ahead import AHEAD
+from template_control.slip.planning.pressure import PRESSURE
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 from template_control.terminal import plain_console

@@ -1,7 +1,3 @@
-from .apex_pose import ApexStart as ApexStart
-from .apex_pose import apex_pose as apex_pose
-from .contacts import ContactOptions as ContactOptions
-from .contacts import FrictionOptions as FrictionOptions
 from .controller import EmbeddingController as EmbeddingController
 from .free.options import FREE_PHASES as FREE_PHASES
 from .free.options import FREE_PLANNER as FREE_PLANNER
@@ -32,12 +28,6 @@ from .planners.running import RunningPlanner as RunningPlanner
 from .planners.transition import TransitionOptions as TransitionOptions
 from .planners.transition import TransitionPlanner as TransitionPlanner
 from .recovery import CatchOptions as CatchOptions
-from .robot_template import default_gait as default_gait
-from .robot_template import paper_gait as paper_gait
-from .robot_template import robot_gait_for_speed as robot_gait_for_speed
-from .robot_template import robot_route as robot_route
-from .robot_template import template_for as template_for
-from .robot_template import walking_speeds as walking_speeds
 from .rollout import ReplanOptions as ReplanOptions
 from .standing.curves import StandingOptions as StandingOptions
 from .standing.curves import standing_pose as standing_pose

@@ -16,10 +16,9 @@ import numpy as np
 
 from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
-from template_control.embedding.contacts import NO_FORCE, forget_contacts, set_contacts
 from template_control.embedding.free.motion import Course, LateralMotion
 from template_control.embedding.free.options import FreeOptions, default_options
-from template_control.embedding.ground import SlopeEstimate, SlopeFrame
+from template_control.embedding.ground import SlopeFrame
 from template_control.embedding.learners import Learners
 from template_control.embedding.modes import PLACED, check_legs, first_fired, modes, set_guards
 from template_control.embedding.options import EmbeddingOptions
@@ -43,6 +42,8 @@ from template_control.embedding.tick import (
     stand,
 )
 from template_control.errors import ParameterError
+from template_control.estimation.contacts import NO_FORCE, forget_contacts, set_contacts
+from template_control.estimation.slope import SlopeEstimate
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import onward

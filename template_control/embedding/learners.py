@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.com_path import TemplatePath
-from template_control.embedding.contacts import set_friction
 from template_control.embedding.lean import TrunkLean
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.state import EstimatorState
 from template_control.embedding.supervisor import StrideSupervisor
+from template_control.estimation.friction import set_friction
 from template_control.robot.biped import Biped
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.gaits.gait import Gait, uncontrolled
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.path import TemplatePath
 from template_control.slip.similarity import Scale
 from template_control.structured import Number
 

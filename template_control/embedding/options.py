@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from template_control.checks.ranges import Range
-from template_control.embedding.contacts import ContactOptions, FrictionOptions
 from template_control.embedding.lean import LeanOptions
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.phases import PHASES, PhaseControl, Phases
@@ -16,7 +15,9 @@ from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.swing import SwingOptions
 from template_control.errors import ParameterError, meant
+from template_control.estimation.contacts import ContactOptions
 from template_control.estimation.delay import DelayOptions
+from template_control.estimation.friction import FrictionOptions
 from template_control.slip.automaton.vocabulary import Phase
 from template_control.slip.similarity import tuned
 from template_control.whole_body.solver import QpOptions

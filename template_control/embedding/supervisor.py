@@ -15,16 +15,13 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.fitting import answered_or_none
-from template_control.embedding.com_path import (
+from template_control.embedding.planned_path import (
     LEADS_NOWHERE,
     OVERDUE,
     PATH,
     STRAYED,
-    TemplatePath,
-    join,
     plan_is_due,
 )
-from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.planners.planner import (
     Cause,
     Context,
@@ -51,6 +48,8 @@ from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.maps.section import Section
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.path import TemplatePath, join
+from template_control.slip.planning.catching import CatchingStep
 from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.structured import Number
 

@@ -19,21 +19,12 @@ import numpy as np
 
 from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled
-from template_control.embedding.com_path import KEPT, PATH, move_clock, plan_is_due
-from template_control.embedding.contacts import (
-    CONTACTS,
-    DUE,
-    IN_AIR,
-    ON_GROUND,
-    SLIDES,
-    feel_slides,
-    update_contacts,
-)
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.lean import LEAN, advance_lean
 from template_control.embedding.modes import GUARDS, MODE, first_fired
+from template_control.embedding.planned_path import KEPT, PATH, move_clock, plan_is_due
 from template_control.embedding.state import SENSED, read_state, rolled
 from template_control.embedding.swing import (
     FEET,
@@ -46,6 +37,8 @@ from template_control.embedding.swing import (
     swing_step,
     wait,
 )
+from template_control.estimation.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
+from template_control.estimation.friction import SLIDES, feel_slides
 from template_control.robot.library import load_robot
 from template_control.robot.terms import LEGS, UP, onward
 from template_control.slip.automaton.vocabulary import Event

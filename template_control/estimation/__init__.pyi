@@ -1,9 +1,11 @@
 from .base_filter import BaseFilterOptions as BaseFilterOptions
+from .contacts import ContactOptions as ContactOptions
 from .delay import DelayCompensation as DelayCompensation
 from .delay import DelayOptions as DelayOptions
 from .filters import JointFilterOptions as JointFilterOptions
 from .filters import NoiseFilter as NoiseFilter
 from .filters import NoiseFilterOptions as NoiseFilterOptions
+from .friction import FrictionOptions as FrictionOptions
 from .imu import EstimatorOptions as EstimatorOptions
 from .imu import ImuOptions as ImuOptions
 from .imu import Readings as Readings

@@ -17,11 +17,11 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Context, Planner
-from template_control.embedding.robot_template import paper_gait, template_for
 from template_control.paper.reproduction import MAPS, Reproduction
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
+from template_control.robot.template import paper_gait, template_for
 from template_control.run.experiment import Experiment
 from template_control.run.record import Record
 from template_control.run.simulation import simulate

@@ -17,4 +17,9 @@ from .spec import RobotSpec as RobotSpec
 from .start import Pose as Pose
 from .start import floating_state_in as floating_state_in
 from .start import state_at_vlo as state_at_vlo
+from .template import default_gait as default_gait
+from .template import paper_gait as paper_gait
+from .template import robot_gait_for_speed as robot_gait_for_speed
+from .template import template_for as template_for
+from .template import walking_speeds as walking_speeds
 from .urdf_edits import JointLimits as JointLimits

@@ -1,3 +1,5 @@
+from .apex_pose import ApexStart as ApexStart
+from .apex_pose import apex_pose as apex_pose
 from .environment import WalkEnv as WalkEnv
 from .experiment import Experiment as Experiment
 from .experiment import PreparedExperiment as PreparedExperiment
@@ -15,6 +17,7 @@ from .record import RunInterrupted as RunInterrupted
 from .record import SoleRecord as SoleRecord
 from .record import load_record as load_record
 from .recorder import Recorder as Recorder
+from .robot_route import robot_route as robot_route
 from .sensing import SensorOptions as SensorOptions
 from .simulation import simulate as simulate
 from .specs import GaitSpec as GaitSpec

@@ -28,12 +28,7 @@ from template_control.embedding.planners.lqr import WALK, LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
-from template_control.embedding.robot_template import (
-    check_apex,
-    robot_route,
-    standing_options,
-    walk_limits,
-)
+from template_control.embedding.standing.curves import standing_options
 from template_control.embedding.tick import CONTROL
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
@@ -45,7 +40,12 @@ from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.spec import RobotSpec
 from template_control.robot.start import Pose
+from template_control.robot.template import (
+    check_apex,
+    walk_limits,
+)
 from template_control.run.options import FallOptions, HeadingCommand, Push, check_pushes
+from template_control.run.robot_route import robot_route
 from template_control.run.sensing import SensorOptions
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
 from template_control.run.velocity import (

@@ -20,7 +20,6 @@ from template_control.checks.ranges import Positive
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.lqr import WALK
-from template_control.embedding.robot_template import template_for
 from template_control.embedding.state import SectionReport
 from template_control.embedding.tick import CONTROL
 from template_control.errors import DivergedError, ParameterError
@@ -29,6 +28,7 @@ from template_control.plant.plant import Plant, open_plant, plant_name
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.template import template_for
 from template_control.run.experiment import Experiment, PreparedExperiment
 from template_control.run.hand import Hand, plant_force
 from template_control.run.metadata import conditions

@@ -19,14 +19,14 @@ from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import RunningOptions
-from template_control.embedding.robot_template import (
+from template_control.errors import ParameterError
+from template_control.robot.biped import Biped
+from template_control.robot.template import (
     default_gait,
     paper_gait,
     robot_gait_for_speed,
     template_for,
 )
-from template_control.errors import ParameterError
-from template_control.robot.biped import Biped
 from template_control.slip.gaits.gait import Gait, WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_by_speed import gait_for_speed

@@ -8,18 +8,18 @@ from math import atan2, degrees
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.lateral import SIDES, LateralPlanner
-from template_control.embedding.ground import LEVEL, STEEPEST
 from template_control.embedding.phases import phase_control
 from template_control.embedding.planners.planner import Planner
-from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import CLOSING, standing_pose
 from template_control.errors import ParameterError
+from template_control.estimation.slope import LEVEL, STEEPEST
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, floating_state_in, state_at_vlo, state_in
+from template_control.robot.template import startable_slopes
+from template_control.run.apex_pose import ApexStart, apex_pose
 from template_control.run.experiment import Experiment, PreparedExperiment
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.lateral.gait import LateralWish

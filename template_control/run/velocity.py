@@ -13,16 +13,16 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.embedding.free.motion import Course
-from template_control.embedding.robot_template import (
+from template_control.errors import GaitError, ParameterError
+from template_control.robot.biped import Biped
+from template_control.robot.floating_biped import FloatingBaseBiped
+from template_control.robot.template import (
     can_run,
     can_stand,
     default_gait,
     template_for,
     walking_speeds,
 )
-from template_control.errors import GaitError, ParameterError
-from template_control.robot.biped import Biped
-from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.run.options import ForwardSpeed, HeadingCommand, SideSpeed, TurningRate
 from template_control.run.specs import SOLE_RUN
 from template_control.slip.gaits.walking_by_speed import family_speeds

@@ -12,10 +12,10 @@ from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Cause, Decision, RestContext
 from template_control.embedding.recovery import CatchOptions, Recovery
 from template_control.embedding.replanning import free_controls
-from template_control.embedding.robot_template import robot_route
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners
 from template_control.embedding.state import EstimatorState, TemplateState
 from template_control.embedding.supervisor import StrideSupervisor
+from template_control.run.robot_route import robot_route
 from template_control.slip.automaton.automaton import AUTOMATON, RUN_ON
 from template_control.slip.automaton.vocabulary import Event, Outcome, Slot
 from template_control.slip.control.stride_solver import rest

@@ -10,8 +10,8 @@ import pytest
 import template_control as tc
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.planners.transition import RUN_TO_WALK, TransitionPlanner
-from template_control.embedding.robot_template import robot_route
 from template_control.errors import ParameterError
+from template_control.run.robot_route import robot_route
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.gaits.walking_by_speed import walking_gait
 from template_control.slip.scenario.scenario import Scenario, Segment

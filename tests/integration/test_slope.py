@@ -7,16 +7,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import template_control as tc
-from template_control.embedding.com_path import leg_forces
-from template_control.embedding.ground import FRAME, SlopeEstimate, SlopeFrame
+from template_control.embedding.ground import FRAME, SlopeFrame
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.state import TemplateState
 from template_control.errors import GaitError
+from template_control.estimation.slope import SlopeEstimate
 from template_control.slip import MapKind, ReturnMap, on_slope, simulate_stride, with_push_off
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import uncontrolled
 from template_control.slip.maps.section import VLO
+from template_control.slip.path import leg_forces
 
 STEEP = np.radians([4.0, -4.0])
 

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.com_path import leg_forces
-from template_control.embedding.ground import SlopeEstimate
 from template_control.embedding.planners.planner import Context
-from template_control.embedding.robot_template import startable_slopes
 from template_control.embedding.standing.curves import BetweenFeet, StandingOptions, standing_pose
 from template_control.embedding.standing.planners import standing_planners
 from template_control.errors import ParameterError
+from template_control.estimation.slope import SlopeEstimate
+from template_control.robot.template import startable_slopes
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.path import leg_forces
 
 P = tc.SlipParameters()
 TOES = (0.0, 0.3)

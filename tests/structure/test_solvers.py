@@ -7,14 +7,14 @@ LIBRARY = Path(__file__).resolve().parents[2] / "template_control"
 SOLVER = "slip/control/least_squares.py"
 PROBLEMS = {
     "slip/control/stride_solver.py": "the free controls of one stride",
-    "embedding/planners/look_ahead.py": "controls and states of several walking steps",
+    "slip/planning/look_ahead.py": "controls and states of several walking steps",
 }
 # Of those that evaluate strides in compiled code, with the reason why they are no solver's problem.
 OTHERS = {
     "slip/maps/return_map.py": "the map itself",
     "slip/gaits/basin.py": "follows one law from many states, and chooses nothing",
     "slip/control/modified_walking.py": "the paper's controller, with the paper's search",
-    "embedding/planners/step_search.py": "more states come back than with a plan in its place",
+    "slip/planning/step_search.py": "more states come back than with a plan in its place",
 }
 GAITS = {"slip/gaits/gait.py": "a gait of a given energy: one root of a function of one number"}
 

@@ -17,7 +17,8 @@ ROOT = Path(__file__).resolve().parents[2]
 LIBRARY = ROOT / "template_control"
 # A room imports from itself and from rooms of earlier stages; those of one stage are independent.
 STAGES = (
-    ("slip", "robot"),
+    ("slip",),
+    ("robot",),
     ("whole_body", "estimation"),
     ("embedding",),
     ("plant",),
@@ -34,7 +35,7 @@ SLIP_STAGES = (
     ("maps",),
     ("control",),
     ("gaits",),
-    ("lateral", "scenario"),
+    ("lateral", "scenario", "planning", "path"),
 )
 SHARED = (
     "arrays",
@@ -190,6 +191,13 @@ def test_a_room_of_slip_imports_only_from_rooms_before_it():
         if module[:1] == ("slip",) and len(module) > 1
     }
     assert_none(against_the_stages(edges, SLIP_STAGES, 1))
+
+
+def test_of_a_robots_models_only_its_template_knows_slip():
+    edges = {m: targets for m, targets in graph().items() if m[:1] == ("robot",) and len(m) > 1}
+    assert {m for m, targets in edges.items() if any(t[0] == "slip" for t, _ in targets)} == {
+        ("robot", "template")
+    }
 
 
 def test_no_modules_import_one_another():

@@ -10,11 +10,11 @@ import pytest
 from template_control.cli.main import main
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
-from template_control.embedding.robot_template import default_gait, paper_gait, template_for
 from template_control.errors import RobotError
 from template_control.robot.five_link import FiveLink, Link
 from template_control.robot.library import ROBOTS, SHIPPED, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.template import default_gait, paper_gait, template_for
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.gaits.running_gait import running_gait

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.phases import PHASES
@@ -17,6 +16,7 @@ from template_control.embedding.state import TemplateState
 from template_control.errors import ParameterError
 from template_control.robot.start import state_in
 from template_control.robustness.disturbances import footholds
+from template_control.run.apex_pose import ApexStart, apex_pose
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.automaton import AUTOMATON

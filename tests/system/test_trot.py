@@ -5,12 +5,12 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.embedding.robot_template import robot_route
 from template_control.errors import ScenarioError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.spec import RobotSpec
 from template_control.run.options import Push
+from template_control.run.robot_route import robot_route
 from template_control.run.specs import GaitSpec
 from template_control.slip.scenario.scenario import Scenario, Segment
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control import embedding, run, slip, sweep, whole_body
+from template_control import embedding, estimation, run, slip, sweep, whole_body
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import (
     Array,
@@ -101,7 +101,7 @@ def test_a_function_checks_its_arguments():
 OPTIONS = [
     tc.EmbeddingOptions, tc.IdealOptions, tc.LqrOptions, tc.PlantOptions, tc.SensorOptions,
     tc.Experiment, tc.SlipParameters, embedding.GuardOptions, embedding.LeanOptions,
-    embedding.FrictionOptions,
+    estimation.FrictionOptions,
     embedding.AheadOptions,
     embedding.ModifiedOptions, embedding.ReplanOptions,
     embedding.RunningOptions, TransitionOptions, run.GaitSpec,

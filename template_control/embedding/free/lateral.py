@@ -16,7 +16,6 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.embedding.com_path import TemplatePath
 from template_control.embedding.planners.planner import Decision
 from template_control.slip.automaton.vocabulary import Slot
 from template_control.slip.gaits.gait import Gait
@@ -41,6 +40,7 @@ from template_control.slip.lateral.placing import (
     place,
 )
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.path import TemplatePath
 from template_control.slip.similarity import Scale, scaled
 
 BEYOND = 0.03

@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.free.catching import Reach, catching_step
 from template_control.embedding.free.lateral import (
     BEYOND,
     SIDES,
@@ -39,6 +38,7 @@ from template_control.slip.lateral.gait import LateralWish, Side
 from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.catching import Reach, catching_step
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
 from template_control.whole_body.solver import SOLE_SHARE

@@ -29,7 +29,6 @@ from template_control.embedding.phases import (
 )
 from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD
 from template_control.embedding.planners.lqr import LqrOptions
-from template_control.embedding.pressure import UNLOADING
 from template_control.embedding.rollout import ReplanOptions
 from template_control.embedding.swing import SwingOptions
 from template_control.estimation.filters import NoiseFilterOptions
@@ -37,6 +36,7 @@ from template_control.robot.biped import Biped
 from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Leg, Phase
 from template_control.slip.lateral.gait import LateralOptions
+from template_control.slip.planning.pressure import UNLOADING
 from template_control.slip.similarity import LENGTH, TIME, tuned
 from template_control.whole_body.task import Task
 from template_control.whole_body.tasks import (

@@ -15,16 +15,17 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.embedding.com_path import sample
-from template_control.embedding.pressure import (
+from template_control.robot.terms import onward
+from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.path import sample
+from template_control.slip.planning.catching import CATCHING_SHARE
+from template_control.slip.planning.pressure import (
     ARRIVE,
     SMOOTH,
     UNLOADING,
     Pieces,
     pressure,
 )
-from template_control.robot.terms import onward
-from template_control.slip.automaton.vocabulary import Event
 from template_control.whole_body.solver import SOLE_SHARE
 
 _HOLDING = 1.5  # by which it moves beyond the capture point's distance from where a robot stands
@@ -51,8 +52,6 @@ _LIGHTEST = 0.05  # of the weight: legs do not pull
 LOWEST = 0.3
 """Of the legs' length: the least height of the CoM that is planned with."""
 _LEAST_SHARE = 0.3  # of a step, at which a capture point is taken to be between the feet
-CATCHING_SHARE = 0.7
-"""Share of a catching step's way to the side at which the capture point is as the foot lands."""
 _SPARE = 0.4  # of half a sole's length, by which it may be off the line between them
 _WIDEST = 0.5  # of the legs' length: the furthest foothold to the side that catches the CoM
 # For the reference template.

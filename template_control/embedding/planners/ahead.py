@@ -11,13 +11,21 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Range
-from template_control.embedding.planners.gait_table import (
-    COLUMNS,
+from template_control.embedding.planners.lqr import WALK, LqrPlanner
+from template_control.embedding.planners.planner import Context, Decision, Planner
+from template_control.errors import ScenarioError
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Outcome
+from template_control.slip.control.least_squares import Search
+from template_control.slip.dynamics.stride import StrideSimulator, controls
+from template_control.slip.gaits.gait import WalkingGait
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import PADDED, VLO
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.gait_table import (
     CONTROL,
-    CONTROL_TOLERANCE,
     CONTROLS,
     STATE,
-    STATE_TOLERANCE,
     STEP_DURATION,
     STEP_LENGTH,
     STIFFNESS,
@@ -26,46 +34,22 @@ from template_control.embedding.planners.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.embedding.planners.look_ahead import (
-    DEFECT,
-    DEGREE,
+from template_control.slip.planning.limits import SWING, WalkLimits, usual_knee_moment
+from template_control.slip.planning.look_ahead import (
+    AHEAD,
     SEARCH,
-    TOLERANCE,
-    TOO_SHORT,
-    PlanCosts,
     PlanProblem,
     make_plan,
     new_problem,
     step_controls,
 )
-from template_control.embedding.planners.lqr import (
-    KNEE_STRAIGHT,
-    WALK,
-    LqrPlanner,
-    usual_knee_moment,
-)
-from template_control.embedding.planners.planner import ANY_ANGLE, Context, Decision, Planner
-from template_control.embedding.planners.speed_changes import SpeedChange, speed_changes
-from template_control.errors import ScenarioError
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.vocabulary import Outcome
-from template_control.slip.control.least_squares import Search
-from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.dynamics.stride import StrideSimulator, controls
-from template_control.slip.gaits.gait import WalkingGait
-from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import PADDED, VLO
-from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.plan_costs import plan_costs
+from template_control.slip.planning.speed_changes import SpeedChange, speed_changes
 from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 from template_control.structured import Kept, keep
-from template_control.warm_up import Part, ready
+from template_control.warm_up import ready
 
-RISE = (0.13, 0.01)
-"""|dy/dt| at VLO that costs nothing, and what is beyond it and costs 1 [m/s], for the reference
-template: from there on the template soon leaves the ground, or the leg sinks."""
-SWING = 0.155
-"""Time of five-link's swing at the least [s]."""
 SPACING = 0.05
 """Spacing of the speeds at VLO whose gaits the search leads to where no plan is cheap [m/s], for
 the reference template; each gait that is made is kept."""
@@ -81,7 +65,6 @@ _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2,
 # Pace with heavy legs [m/s], for the reference template: with twice as much 2 of 10 random profiles
 # of rabbit ended in a fall, with changes of the table 5.
 _HEAVY_PACE = 0.15
-_EARLIEST = 0.09  # time from VLO to a touchdown at the least [s], for the reference template
 _BEHIND = 0.08  # of the wanted speed, that is none [m/s], for the reference
 _MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
 
@@ -121,22 +104,6 @@ VLO was 0.07 m/s off, the next plan jumped to make up for it, and Go2 fell in it
 BIPED_AHEAD = replace(FREE_AHEAD, pace=0.09)
 """Of a biped with a floating base: from further away no plan was cheap in the second step. The
 search led G1 to a slow gait and a fall, or a foot of Bolt too far ahead for its hips."""
-
-
-class WalkLimits(NamedTuple):
-    """What a robot's legs allow of its walks.
-
-    Attributes:
-        knee_moment: of the template's leg force about the knees [N m].
-        speeds: least and greatest dx/dt at VLO of the gaits that are aimed at [m/s].
-        swing: time from a foot's liftoff to its touchdown at the least [s].
-        light: whether its legs are light enough to change the speed within a few steps.
-    """
-
-    knee_moment: float
-    speeds: tuple[float, float]
-    swing: float
-    light: bool = True
 
 
 class _Plan(NamedTuple):
@@ -201,7 +168,7 @@ class AheadPlanner(Planner):
         if not self.limits.light:
             pace = min(o.pace, _HEAVY_PACE * scale.speed)
             o = self.options = replace(o, changes=0, pace=pace)
-        self._costs = plan_costs(parameters, o, self.limits)
+        self._costs = plan_costs(parameters, self.limits, o.ease)
         self._problems: dict[int, tuple[PlanProblem, Kept]] = {}
         self._changes, self._map = speed_changes(parameters), ReturnMap(parameters, STRIDE)
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
@@ -359,38 +326,6 @@ class AheadPlanner(Planner):
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         self._lqr.observe(decision, z)
         self.offset = self._lqr.offset
-
-
-def plan_costs(parameters: SlipParameters, options: AheadOptions, limits: WalkLimits) -> PlanCosts:
-    """Model and costs of the plans on a template; the options are scaled to it."""
-    scale = Scale.of(parameters)
-    beyond, tolerance = RISE
-    return PlanCosts(
-        kernel=stride_kernel(parameters, STRIDE)._replace(degree=DEGREE, tolerance=TOLERANCE),
-        table=gait_table(parameters),
-        defect=DEFECT * scale.state,
-        tolerance=STATE_TOLERANCE * scale.state,
-        control_tolerance=options.ease * CONTROL_TOLERANCE,
-        rise=(beyond * scale.speed, tolerance * scale.speed),
-        knee_reach=KNEE_STRAIGHT * scale.length,
-        knee_moment=limits.knee_moment,
-        earliest=_EARLIEST * scale.time,
-        swing=limits.swing,
-        short=TOO_SHORT * scale.time,
-        unit=scale.state,
-        columns=COLUMNS,
-    )
-
-
-def plan_ahead() -> None:
-    """The compiled plan, so that a helper process can compile it."""
-    costs = plan_costs(SlipParameters(), AheadOptions(), WalkLimits(np.inf, (0.0, 1.0), 0.0))
-    problem = new_problem(costs, 1)
-    make_plan(keep(problem), (1.0, True), ANY_ANGLE, SEARCH, _NEVER, np.ones(CONTROLS))
-
-
-AHEAD = (Part(plan_ahead, 10.0),)
-"""Compiled functions of this planner, in addition to a walk's."""
 
 
 def check_feasibility(route: Route, planner: AheadPlanner) -> None:

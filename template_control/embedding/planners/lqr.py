@@ -24,17 +24,15 @@ from template_control.embedding.planners.planner import (
     RestContext,
     learnt,
 )
-from template_control.embedding.planners.step_search import (
-    EFFORT,
-    FALL_PRICE,
-    SEARCH,
-    Law,
-    choose,
-)
 from template_control.errors import GaitError
 from template_control.slip.automaton.vocabulary import Outcome, Slot
 from template_control.slip.control.least_squares import Search
-from template_control.slip.control.lqr import lqr, settling_map
+from template_control.slip.control.lqr import (
+    CONTROL_WEIGHT,
+    SETTLED_TOLERANCE,
+    lqr,
+    settling_map,
+)
 from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.control.stride_solver import Prior, solve_stride
 from template_control.slip.dynamics.kernel import new_scratch
@@ -49,6 +47,19 @@ from template_control.slip.gaits.gait import (
 from template_control.slip.gaits.walking_by_speed import other_walks
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.limits import (
+    ANGLE_RANGE,
+    KNEE_STRAIGHT,
+    STIFFNESS_RANGE,
+    usual_knee_moment,
+)
+from template_control.slip.planning.step_search import (
+    EFFORT,
+    FALL_PRICE,
+    SEARCH,
+    Law,
+    choose,
+)
 from template_control.slip.similarity import (
     LENGTH,
     PER_LENGTH_SQUARED,
@@ -64,18 +75,9 @@ from template_control.warm_up import ready
 _Three = tuple[NotNegative, NotNegative, NotNegative]
 _VLO_STATE = (SPEED, LENGTH, SPEED)
 
-# Bounds of the controls. Steeper angles make steps too short in time for the swing leg, flatter
-# ones let the CoM sink lower than the knees can carry it.
-ANGLE_RANGE = (-0.12, 0.065)
-"""Least and greatest touchdown angle relative to the gait's [rad]."""
-STIFFNESS_RANGE = (0.5, 1.5)
-"""Least and greatest stiffness of a leg, over k0."""
 # A loaded leg that gets softer takes energy out, and sinks so low that the knee does not lift it.
 _SOFTEST_REST = 0.75  # over k0, for the rest of a step that has begun and ends slow
 
-# Costs of the controls.
-CONTROL_WEIGHT = 100.0
-"""Weight of the settled controls' squared changes [rad, share of k0]."""
 _PUSH_OFF_COST = 2.0  # of the LQR on kappa_p, as a share of k0
 # The fastest gaits bear no large change of their controls: with less weight the walk sways.
 _STRAIGHT = 0.004  # bend of the leg at VLO, 1 - y/l0, at which CONTROL_WEIGHT counts twice
@@ -90,10 +92,6 @@ _ROUNDS = 2  # of Newton's method for the fixed point; it begins at the last one
 # A template that flies on to this far above l0 is in flight: no walking step begins there. A robot
 # is a few millimetres above l0 in steady walks too.
 _FLIGHT = 0.005  # [m], for the reference template
-# Five-link's numbers: its knees have 350 N m, and its walks need some of them for the other leg.
-KNEE_STRAIGHT = 1.095  # leg length at which the knee is straight [m]: it ends above the hip
-KNEE_MOMENT = 0.41  # of the leg force about the knee, over the weight, that costs nothing [m]
-
 # Second steps that are tried after the law's own: alpha relative to the gait's [rad], kappa_1,
 # kappa_2 (and kappa_p) over k0. A leg that is stiffer before its virtual bottom than after takes
 # energy out, the reverse puts some in; so does a stiff push-off.
@@ -116,12 +114,6 @@ _SECOND_PUSH_OFF_STEPS = (
     (0.045, 0.75, 0.75, 1.25),
 )
 _REST_ROUNDS = 6  # of Gauss and Newton's method; most choices take three
-
-
-def usual_knee_moment(parameters: SlipParameters) -> float:
-    """Moment of the leg force about the knee that costs nothing [N m]: five-link's, scaled."""
-    p = parameters
-    return KNEE_MOMENT * Scale.of(p).length * p.mass * p.gravity
 
 
 WALK = (*STRIDES, *SEARCH)
@@ -157,7 +149,7 @@ class LqrOptions(Checked):
     )
     control_cost: tuple[Positive, Positive, Positive] = tuned((5.0, 2.0, 2.0))
     offset_gain: Share = tuned(0.2)
-    tolerance: tuple[Positive, Positive, Positive] = tuned((0.011, 0.005, 0.03), *_VLO_STATE)
+    tolerance: tuple[Positive, Positive, Positive] = tuned(SETTLED_TOLERANCE, *_VLO_STATE)
     earliest_touchdown: NotNegative = tuned(0.12, TIME)
     earliest_share: Share = tuned(0.2)
     trusted_price: NotNegative = tuned(1.0)

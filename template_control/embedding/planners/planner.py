@@ -22,9 +22,7 @@ from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
-
-ANY_ANGLE = (-np.inf, np.inf)
-"""Range of angles that leaves the touchdown angle free."""
+from template_control.slip.planning.limits import ANY_ANGLE
 
 
 @dataclass(frozen=True)

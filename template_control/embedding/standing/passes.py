@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.pressure import PRESSURE
 from template_control.embedding.standing.curves import CLOSING, BetweenFeet, StandingOptions
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
@@ -17,6 +16,7 @@ from template_control.slip.dynamics.stride import StrideSimulator, controls
 from template_control.slip.gaits.gait import GaitsBySpeed
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.pressure import PRESSURE
 from template_control.slip.similarity import Scale
 from template_control.warm_up import ready
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.checked import checked
-from template_control.embedding.free.catching import CatchingStep
 from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
 from template_control.embedding.standing.curves import PLACE, BetweenFeet, Found, StandingOptions
 from template_control.embedding.standing.passes import PassTable, SingleSupportPass
@@ -25,6 +24,7 @@ from template_control.slip.dynamics.timed import Quintic, timed_stride
 from template_control.slip.gaits.gait import Gait, GaitsBySpeed
 from template_control.slip.gaits.walking_by_speed import gaits_by_speed, paper_walks
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.catching import CatchingStep
 from template_control.slip.similarity import Scale, scaled
 
 STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)

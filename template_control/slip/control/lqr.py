@@ -7,6 +7,11 @@ from scipy.linalg import solve_discrete_are
 
 from template_control.arrays import Array
 
+CONTROL_WEIGHT = 100.0
+"""Weight of the settled controls' squared changes [rad, share of k0]."""
+SETTLED_TOLERANCE = (0.011, 0.005, 0.03)
+"""Errors of the settled dx/dt, y, dy/dt that count as equally bad [m/s, m, m/s], for l0 = 1 m."""
+
 
 def lqr(a: Array, b: Array, q: Array, r: Array) -> tuple[Array, Array]:
     """Cost-to-go P (n, n) and gain K (c, n) of u = -K z for z_next = A z + B u.

@@ -311,7 +311,7 @@ def test_an_advised_gait_exists_and_is_not_what_was_refused(angle, speed):
 
 
 def test_advised_speeds_are_had():
-    robot, p = tc.load_robot("five-link"), tc.embedding.template_for(tc.load_robot("rabbit"))
+    robot, p = tc.load_robot("five-link"), tc.robot.template_for(tc.load_robot("rabbit"))
     for ask in (
         lambda v: tc.robot_gait_for_speed(robot, v),
         lambda v: tc.running_gait(p, v),

@@ -6,7 +6,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from robot_guards import RobotGuards
 
-from template_control.embedding.com_path import at_direction, join, leg_forces, sample
 from template_control.embedding.learners import LoadEstimate
 from template_control.embedding.modes import GuardOptions
 from template_control.embedding.state import TemplateState
@@ -19,6 +18,7 @@ from template_control.slip.dynamics.stride import controls, simulate_stride
 from template_control.slip.gaits.gait import gait_from_energy
 from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.path import at_direction, join, leg_forces, sample
 
 P = SlipParameters()
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from contact_flags import take_in
 
-from template_control.embedding.contacts import CONTACTS, ContactOptions, set_contacts
 from template_control.embedding.free.options import FreeOptions, TrotOptions, default_options
 from template_control.embedding.modes import modes
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.swing import FEET, spread_contacts
 from template_control.embedding.tick import TICK, stand
+from template_control.estimation.contacts import CONTACTS, ContactOptions, set_contacts
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment

@@ -17,7 +17,20 @@ from template_control.embedding.planners.ahead import (
     check_feasibility,
     plan_costs,
 )
-from template_control.embedding.planners.gait_table import (
+from template_control.embedding.planners.planner import Cause, Context
+from template_control.errors import ScenarioError
+from template_control.robot.template import walk_limits
+from template_control.run.summary import summarise
+from template_control.slip.automaton.automaton import AUTOMATON
+from template_control.slip.automaton.vocabulary import Event, Outcome
+from template_control.slip.control.least_squares import Search
+from template_control.slip.control.touchdown import TOP_MARGIN
+from template_control.slip.dynamics.model import stride_kernel
+from template_control.slip.dynamics.stride import StrideSimulator
+from template_control.slip.gaits.walking_by_speed import walking_by_speed
+from template_control.slip.maps.return_map import ReturnMap
+from template_control.slip.maps.section import VLO
+from template_control.slip.planning.gait_table import (
     CONTROL,
     CONTROLS,
     FACTOR,
@@ -29,7 +42,8 @@ from template_control.embedding.planners.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.embedding.planners.look_ahead import (
+from template_control.slip.planning.limits import ANY_ANGLE, KNEE_MOMENT
+from template_control.slip.planning.look_ahead import (
     BLOCK,
     BOUNDS,
     SEARCH,
@@ -43,20 +57,6 @@ from template_control.embedding.planners.look_ahead import (
     roughness,
     step_controls,
 )
-from template_control.embedding.planners.lqr import KNEE_MOMENT
-from template_control.embedding.planners.planner import ANY_ANGLE, Cause, Context
-from template_control.embedding.robot_template import walk_limits
-from template_control.errors import ScenarioError
-from template_control.run.summary import summarise
-from template_control.slip.automaton.automaton import AUTOMATON
-from template_control.slip.automaton.vocabulary import Event, Outcome
-from template_control.slip.control.least_squares import Search
-from template_control.slip.control.touchdown import TOP_MARGIN
-from template_control.slip.dynamics.model import stride_kernel
-from template_control.slip.dynamics.stride import StrideSimulator
-from template_control.slip.gaits.walking_by_speed import walking_by_speed
-from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import VLO
 from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.structured import keep

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.com_path import leg_forces
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.standing.curves import StandingOptions, standing_pose
@@ -18,6 +17,7 @@ from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.dynamics.timed import Quintic, polynomial
 from template_control.slip.gaits.walking_by_speed import paper_walks
 from template_control.slip.maps.section import REST, VLO
+from template_control.slip.path import leg_forces
 from template_control.slip.scenario.route import SteadyRoute
 from template_control.slip.scenario.scenario import Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
@@ -294,7 +294,7 @@ def test_every_kind_of_stride_leads_on():
 
 def stand(spacing, impulse, beats):
     robot = tc.load_robot("five-link")
-    p = tc.embedding.template_for(robot)
+    p = tc.robot.template_for(robot)
     pushes = (Push(impulse, step=1),) if impulse else ()
     route = SteadyRoute(p, "s", [0.0, 0.97, 0.0])
     return tc.simulate(
@@ -334,7 +334,7 @@ def walked(spacing, speed):
     robot = tc.load_robot("five-link")
     still = Segment("stand", duration=1.0)
     scenario = Scenario(segments=(still, Segment("walk", speed=speed, duration=1.0), still))
-    pose = standing_pose(tc.embedding.template_for(robot), spacing)
+    pose = standing_pose(tc.robot.template_for(robot), spacing)
     return tc.simulate(tc.Experiment(robot, scenario, pose=pose))
 
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from template_control.embedding.robot_template import template_for
 from template_control.embedding.swing import (
     FEET,
     HIGH_SWING,
@@ -22,6 +21,7 @@ from template_control.embedding.swing import (
 )
 from template_control.embedding.tick import TICK, move_swings
 from template_control.robot.library import load_floating_robot
+from template_control.robot.template import template_for
 from template_control.robot.terms import ROBOT_DATA
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.similarity import Scale, scaled

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import template_control as tc
-from template_control.embedding import ContactOptions, EmbeddingOptions
-from template_control.embedding.contacts import CONTACTS, set_contacts
+from template_control.embedding import EmbeddingOptions
+from template_control.estimation import ContactOptions
+from template_control.estimation.contacts import CONTACTS, set_contacts
 from template_control.robot.library import load_floating_robot
 from template_control.robot.start import state_at_vlo
 from template_control.slip.similarity import Scale

@@ -7,7 +7,6 @@ import pytest
 from other_frames import rewritten
 
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.robot_template import default_gait, template_for
 from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
@@ -16,6 +15,7 @@ from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.start import Pose, floating_state_in, state_at_vlo
+from template_control.robot.template import default_gait, template_for
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 

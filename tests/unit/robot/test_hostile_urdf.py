@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from template_control.embedding.planners.lqr import LqrPlanner
-from template_control.embedding.robot_template import default_gait
 from template_control.errors import RobotError
 from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions
 from template_control.plant.mujoco import MujocoOptions
 from template_control.robot.library import load_floating_robot, load_robot, robot_path
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.template import default_gait
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.view.replay.robot_visuals import load_shapes

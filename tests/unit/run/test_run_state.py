@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.apex_pose import ApexStart, apex_pose
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
 from template_control.embedding.options import EmbeddingOptions
@@ -12,6 +11,7 @@ from template_control.embedding.phases import PHASES
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
 from template_control.robot.start import state_in
+from template_control.run.apex_pose import ApexStart, apex_pose
 from template_control.run.experiment import Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import Leg, Phase

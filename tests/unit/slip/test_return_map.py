@@ -6,7 +6,6 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
-from template_control.embedding.planners.look_ahead import DEFECT
 from template_control.errors import ParameterError
 from template_control.paper.map_errors import study
 from template_control.slip.automaton.automaton import AUTOMATON, STRIDE_START
@@ -30,6 +29,7 @@ from template_control.slip.maps.return_map import (
 )
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.look_ahead import DEFECT
 
 P = SlipParameters()
 K0 = P.leg_stiffness

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
-from template_control.embedding.robot_template import template_for
 from template_control.robot.library import load_robot
+from template_control.robot.template import template_for
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import (
     ACCELERATION,

@@ -12,9 +12,9 @@ import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Context
-from template_control.embedding.robot_template import walk_limits
 from template_control.errors import GaitError
 from template_control.robot.library import ROBOTS
+from template_control.robot.template import walk_limits
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.gaits import family_search
 from template_control.slip.gaits.family_search import (

@@ -1,6 +1,6 @@
 """Search for the changes of speed: for each pair of gaits the fewest steps that the knees bear.
 
-A change is a plan of :mod:`~.planners.look_ahead` that ends in the gait, and whose speed, height
+A change is a plan of :mod:`~.planning.look_ahead` that ends in the gait, and whose speed, height
 and controls cost next to nothing. It is sought from the gaits between, random steps about them, and
 the steps of other changes, until none gets shorter or cheaper.
 """
@@ -14,8 +14,12 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.planners.ahead import SWING, AheadOptions, WalkLimits, plan_costs
-from template_control.embedding.planners.gait_table import (
+from template_control.slip.automaton.automaton import STRIDE_START
+from template_control.slip.control.least_squares import Search
+from template_control.slip.dynamics.stride import simulate_stride
+from template_control.slip.maps.return_map import LIFTED_TIME, ReturnMap
+from template_control.slip.maps.section import VLO
+from template_control.slip.planning.gait_table import (
     CONTROL,
     CONTROLS,
     STATE,
@@ -25,10 +29,10 @@ from template_control.embedding.planners.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.embedding.planners.look_ahead import (
+from template_control.slip.planning.limits import ANY_ANGLE, SWING, WalkLimits
+from template_control.slip.planning.look_ahead import (
     BLOCK,
     STATES,
-    PlanCosts,
     PlanProblem,
     begin,
     look_ahead,
@@ -36,13 +40,8 @@ from template_control.embedding.planners.look_ahead import (
     roughness,
     step_controls,
 )
-from template_control.embedding.planners.planner import ANY_ANGLE
-from template_control.embedding.planners.speed_changes import SpeedChange
-from template_control.slip.automaton.automaton import STRIDE_START
-from template_control.slip.control.least_squares import Search
-from template_control.slip.dynamics.stride import simulate_stride
-from template_control.slip.maps.return_map import LIFTED_TIME, ReturnMap
-from template_control.slip.maps.section import VLO
+from template_control.slip.planning.plan_costs import PlanCosts, plan_costs
+from template_control.slip.planning.speed_changes import SpeedChange
 from template_control.slip.similarity import REFERENCE
 
 SPEEDS = (0.26, 0.326, 0.41, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.317)
@@ -75,7 +74,7 @@ Starts = Callable[[PlanProblem, Array], Iterator[Array]]
 def costs() -> PlanCosts:
     """Costs of a change: a plan's, but with steps that join better, and are nearly free."""
     limits = WalkLimits(_KNEE, (SPEEDS[0], SPEEDS[-1]), SWING)
-    plan = plan_costs(REFERENCE, AheadOptions(), limits)
+    plan = plan_costs(REFERENCE, limits)
     return plan._replace(
         defect=_DEFECT * plan.defect,
         tolerance=_TOLERANCE,

@@ -1,6 +1,6 @@
 """Table of changes of speed: walking steps from gait to gait, that a plan stays near.
 
-They are found off line by :mod:`~.planners.change_search`.
+They are found off line by :mod:`~.planning.change_search`.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.planners.gait_table import STATE_TOLERANCE
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.gait_table import STATE_TOLERANCE
 from template_control.slip.similarity import Scale
 
 _NEAR = 0.05  # difference of the aimed speeds that counts as one tolerance of the state

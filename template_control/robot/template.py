@@ -1,11 +1,10 @@
-"""The template of a robot, and what the robot can follow: gaits, speeds, apexes, scenarios.
+"""The template of a robot, and what of it the robot can follow: gaits, speeds and apexes.
 
 What is found of a robot overwrites the last update of its model.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import radians
 
 import numpy as np
@@ -13,16 +12,10 @@ import numpy as np
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
 from template_control.checks.ranges import Angle, Positive
-from template_control.embedding.free.options import SOLE_STAND
-from template_control.embedding.planners.ahead import WalkLimits
-from template_control.embedding.planners.gait_table import STATE, gait_table, row_at
-from template_control.embedding.planners.lqr import usual_knee_moment
-from template_control.embedding.planners.running import AGILE
-from template_control.embedding.standing.curves import StandingOptions
-from template_control.errors import GaitError, ScenarioError
+from template_control.errors import GaitError
 from template_control.robot.biped import Biped
 from template_control.robot.terms import UP
-from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
+from template_control.slip.automaton.vocabulary import Event, Slot
 from template_control.slip.gaits.family_search import stance_figures
 from template_control.slip.gaits.gait import (
     WalkingGait,
@@ -34,21 +27,17 @@ from template_control.slip.gaits.gait import (
 from template_control.slip.gaits.running_gait import (
     RunningGait,
     running_gait,
-    running_speeds,
     suited_height,
 )
 from template_control.slip.gaits.walking_by_speed import (
     family_speeds,
     gait_for_speed,
-    speed_range,
     walking_by_speed,
 )
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.scenario.scenario import STAND, Scenario
-from template_control.slip.scenario.scenario_route import ScenarioRoute
-from template_control.slip.similarity import REFERENCE, Scale, scaled
-from template_control.whole_body.solver import SOLE_SHARE
+from template_control.slip.planning.limits import WalkLimits, usual_knee_moment
+from template_control.slip.similarity import REFERENCE, Scale
 
 _TOUCHDOWN = float(np.radians(66.0))
 _WALK = (_TOUCHDOWN, 1.1 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length)))
@@ -60,12 +49,6 @@ _STRETCH = 0.903514524055713
 # Of legs that end in an ankle: more bent, the rear one comes to the ankle's stop late in double
 # stance, as its sole is level.
 _SOLE_STRETCH = 0.95
-_LIFTED = 0.03  # shortest time on a pair of feet before VLO; the other has nothing to pass [s]
-_PASSED = 0.08  # the same on a sole: the other one, a step behind, swings past it [s]
-_SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles or pairs [s], for l0 = 1 m
-# dx/dt at VLO of a start [m/s], for l0 = 1 m. The step of G1 after a slow one takes a second, and
-# it falls sideways: in 8 of 12 starts at 0.13 to 0.21 m/s, and in none of 9 at 0.26 or more.
-_SLOWEST_START = 0.3
 _KNEES = 0.66  # of that torque: leaning forward moves the rest to the hips, in all robots that ran
 _BEARABLE = 1.25  # of the limit: with 1.28 the apex was reached, with 1.29 it stayed 12 mm too low
 _SHORTEST = 0.8  # of l0, at the bottom: shorter, and the knees come to their stops
@@ -89,8 +72,6 @@ _EVERY = 3  # link of the family's chains is looked at
 _ROUNDING = 1e-6  # of a centimetre per second
 # Of the quintic that a foot follows, over its length and duration.
 _QUINTIC_SPEED, _QUINTIC_ACCELERATION = 1.875, 10.0 / float(np.sqrt(3.0))
-_RANGES = {"walk": (speed_range, "at VLO"), "run": (running_speeds, "at apex")}
-_STRIDE = 0.7  # of sqrt(l0 / g): the duration of a fast running stride
 
 
 @checked
@@ -319,20 +300,6 @@ def can_stand(robot: Biped) -> bool:
     return robot.directions <= UP or bool(robot.half_length)
 
 
-def standing_options(robot: Biped) -> StandingOptions:
-    """Options of a robot's stand, for the reference template; the height is the library's."""
-    if not robot.half_length:
-        return StandingOptions()
-    length = Scale.of(template_for(robot)).length
-    half = robot.half_length / length
-    if not robot.patches:
-        return StandingOptions(half_length=half, shift=_SHIFT, single=_LIFTED)
-    slant = SOLE_SHARE * robot.half_width / (SOLE_STAND * length)
-    return StandingOptions(
-        half_length=half, slant=slant, shift=_SHIFT, single=_PASSED, slowest=_SLOWEST_START
-    )
-
-
 def can_run(robot: Biped) -> bool:
     """True if a robot runs: on points, with light legs, and knees that bear it."""
     if robot.patches or _heavy(robot):
@@ -373,78 +340,3 @@ def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bo
     limit = torque_scale * min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
     folded = _shortest_leg(gait) < _SHORTEST * p.rest_length
     return not folded and knee_torque(robot, gait) <= _BEARABLE * limit
-
-
-@checked
-def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) -> ScenarioRoute:
-    """The scenario on the robot's own template.
-
-    Args:
-        robot: its last update is overwritten.
-        scenario: speeds in m/s, as they are; its heights are scaled with l0.
-        push_off: whether its walk has the gaits of the family by speed, in steps with push-off,
-            and their heights at VLO; None: wherever it may. Its planner then takes the nearest
-            speed where a segment wants what cannot be had.
-
-    Raises:
-        ScenarioError: if a segment stands, and the robot cannot; if the start, or a segment of
-            another walk, wants a speed that no gait of the robot has, or a segment a change of
-            speed that is beyond a stride's reach.
-    """
-    if scenario.stands and not can_stand(robot):
-        number = next(i for i, s in enumerate(scenario.segments, 1) if s.gait == STAND)
-        raise ScenarioError(
-            f"segment {number} stands: {robot.name} has a floating base and cannot stand on two"
-            " feet that are points; leave the stands out, or take a robot with four legs"
-        )
-    own = scenario.on(template_for(robot))
-    p = own.parameters
-    unit = p.speed_unit
-    bears = robot.half_length > 0.0
-    may = own.has_any_speed(bears)
-    if push_off and not may:
-        raise ScenarioError(
-            "the scenario does more than walk: its walk has no push-off; leave planner ahead out"
-        )
-    push_off = may if push_off is None else push_off
-    if not push_off:
-        _check_segments(robot, own)
-    slowest, fastest = (family_speeds if push_off else speed_range)(p)
-    moves = own.segments[0].gait in _RANGES
-    if moves and not slowest <= own.start[0] <= fastest:
-        raise ScenarioError(
-            f"the start has {own.start[0]:g} m/s at VLO: {robot.name} walks from"
-            f" {inward(slowest, fastest)} m/s"
-        )
-    return ScenarioRoute(
-        own,
-        lambda speed: suited_height(speed / unit) * p.rest_length,
-        vlo_height=_family_height(p) if push_off else None,
-        walks=StrideKind.WALK_PUSH_OFF if push_off else StrideKind.WALK,
-        bears=bears,
-    )
-
-
-def _family_height(p: SlipParameters) -> Callable[[float], float]:
-    table = gait_table(p)
-    return lambda speed: float(row_at(table, speed)[STATE + 1])
-
-
-def _check_segments(robot: Biped, own: Scenario) -> None:
-    """Refuse speeds that no gait has, and changes that no stride makes, whatever its motors."""
-    p = own.parameters
-    most = scaled(AGILE, Scale.of(p)).pace / (_STRIDE * float(np.sqrt(p.rest_length / p.gravity)))
-    for number, segment in enumerate(own.segments, 1):
-        find_range, where = _RANGES.get(segment.gait, (None, ""))
-        slowest, fastest = (-np.inf, np.inf) if find_range is None else find_range(p)
-        for speed in (segment.speed, segment.until_speed):
-            if speed is not None and not slowest <= speed <= fastest:
-                raise ScenarioError(
-                    f"segment {number} wants to {segment.gait} at {speed:g} m/s:"
-                    f" {robot.name} can {segment.gait} from {inward(slowest, fastest)} m/s {where}"
-                )
-        if abs(segment.acceleration) > most:
-            raise ScenarioError(
-                f"segment {number} wants {segment.acceleration:g} m/s^2: a stride of {robot.name}"
-                f" changes its speed by at most {most:.2g} m/s^2"
-            )

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.contacts import (
+from template_control.embedding.options import EmbeddingOptions
+from template_control.estimation.friction import (
     SLIDES,
     SLIDING_SPEED,
     FrictionOptions,
     feel_slides,
     set_friction,
 )
-from template_control.embedding.options import EmbeddingOptions
 from template_control.plant.bullet import PlantOptions
 from template_control.slip.similarity import Scale
 

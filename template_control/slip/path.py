@@ -1,15 +1,7 @@
-"""The template's CoM path from now on, its leg forces, and the robot's place on it.
+"""The template's CoM path from now on, and its leg forces.
 
 World frame. The path is kept as the kernel's Taylor polynomials, so references of any order
-come from it exactly. In stance it is looked up by phase, the direction from the rear stance
-foot to the CoM (the angle beta of Section V-B); in flight, where nothing but time passes, by
-time.
-
-The legs' swing makes the robot's CoM run ahead of the template and fall back behind it within
-a step, while its angular momentum about the foot, on which all forces depend, stays the
-template's. So in stance the phase is that of a point that moves with dx/dt + L / (m y), L the
-angular momentum about the CoM: it starts in the CoM at every plan, and leads or lags it by
-centimetres.
+come from it exactly. It is looked up by time, or by the direction from the rear stance foot.
 """
 
 from __future__ import annotations
@@ -17,7 +9,7 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,7 +21,6 @@ from template_control.slip.dynamics.timed import polynomial
 from template_control.slip.maps.section import VLO
 
 _NEWTON = 12
-_TOUCHDOWN = int(Event.TOUCHDOWN)
 # Times of the reference template.
 _OVERRUN = 0.02  # [s] that a segment's polynomial is followed past its ends: template and robot do
 # not come to an event at the same time
@@ -209,83 +200,3 @@ def leg_forces(meta_row: Array, toe: float, com: Array, body: Array, forces: Arr
         forces[leg, 1] += share * com_y
         if forces[leg, 1] < 0.0:
             forces[leg, 0], forces[leg, 1] = 0.0, 0.0  # legs do not pull
-
-
-_F, _I = np.float64, np.int64
-PATH = np.dtype(
-    [
-        # -- the robot's place on it --
-        ("time", _F),  # along the path [s]
-        ("offset", _F),  # of the point whose direction is the phase, ahead of the CoM [m]
-        ("fresh", _I),  # whether the path begins at this tick
-        ("forces", _F, (2, 2)),  # leg forces of the template there, rear and front [N]
-        # -- the plan, written when it changes --
-        # m, g towards the ground and back along it, l0, assist of two legs, half a foot's length
-        ("body", _F, (6,)),
-        ("event_times", _F, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
-        ("landing_x", _F, (2,)),  # of each foot's next foothold [m]; NaN: none
-        ("landing_time", _F, (2,)),  # [s]; inf: never
-        ("toe", _F),  # x of the template's rear toe [m]
-        ("touchdown_angle", _F),  # of the stride [rad]
-        ("step_length", _F),  # of the planner's gait [m]
-        ("step_duration", _F),  # of it [s]
-        ("planned_at", _F),  # when the path began [s]
-        ("viable", _I),  # whether the template completes the path's strides, and goes on
-        ("without_touchdown", _I),  # whether an overdue touchdown has been taken off the path
-        # -- when it is planned anew --
-        ("patience", _F),  # with a touchdown [s]
-        ("interval", _F),  # between plans [s]
-        ("speed", _F),  # deviation of the forward speed [m/s]
-    ],
-    align=True,
-)
-"""The path that the supervisor has planned, and the robot's place on it."""
-
-KEPT, OVERDUE, STRAYED, LEADS_NOWHERE = range(4)
-"""Results of :func:`plan_is_due`: the path is kept, or why it is not."""
-
-
-@compiled
-def move_clock(
-    path: Any, curve: tuple[Array, Array, Array], s: Any, mode: Any, want: Any, motion: Array
-) -> None:
-    """Go on along ``path``, of ``PATH``, to where the robot is now, and write the CoM's reference.
-
-    ``s`` is of ``SENSED``, ``mode`` of ``MODE``, ``want`` of ``REFERENCES``; ``motion`` is dx/dt of
-    the CoM [m/s], and the time since the last tick [s].
-    """
-    (speed, dt), (_, meta, look) = motion, curve
-    x, y = s.state[0] + path.offset - s.toes[0], s.state[1]
-    # Since the last tick, unless the path begins at this one. A direction needs a guess only.
-    guess = path.time + (0.0 if path.fresh and not mode.by_direction else dt)
-    path.fresh = 0
-    if mode.by_direction:
-        path.time, row = at_direction(curve, x, y, guess, want.com)
-    else:
-        path.time, row = guess, sample(curve, guess, want.com)
-    path.offset += (s.state[2] - speed) * dt
-    toe, forces = look[0], path.forces
-    leg_forces(meta[row], toe, want.com, path.body, forces)
-    if meta[row, 3] != toe:
-        # Template and robot are on either side of liftoff: to each foot its own force.
-        for axis in range(2):
-            forces[0, axis], forces[1, axis] = forces[1, axis], forces[0, axis]
-
-
-@compiled
-def plan_is_due(path: Any, lands: bool, deviation: float, phase_time: float, now: float) -> int:
-    """Why the path, of ``PATH``, is to be planned anew at the time ``now`` [s], or ``KEPT``.
-
-    OVERDUE: the swing foot, which ``lands`` on it, should have found the ground by now. STRAYED: a
-    disturbance has carried the robot away from it, by ``deviation`` of the forward speed [m/s].
-    LEADS_NOWHERE: no stride goes on from it. ``phase_time`` is along it [s].
-    """
-    if path.without_touchdown:
-        return KEPT
-    if lands and phase_time > path.event_times[_TOUCHDOWN] + path.patience:
-        return OVERDUE
-    if now - path.planned_at <= path.interval:
-        return KEPT
-    if abs(deviation) > path.speed and phase_time > path.interval:
-        return STRAYED
-    return KEPT if path.viable else LEADS_NOWHERE

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from template_control.embedding.free.catching import Reach, catching_step
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.catching import Reach, catching_step
 from template_control.slip.similarity import Scale
 
 FEET = np.array([[-0.13, 0.12], [0.13, -0.12]])  # the left one behind

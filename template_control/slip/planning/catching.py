@@ -15,9 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.embedding.free.sway import CATCHING_SHARE
 from template_control.slip.similarity import Scale
 
+CATCHING_SHARE = 0.7
+"""Share of a catching step's way to the side at which the capture point is as the foot lands."""
 _ROUNDS = 4  # of the step's duration, which depends on the foothold, and the foothold on it
 # A foot moves ahead or back only where xi will be further off the middle of the feet than this
 # share of half a sole.

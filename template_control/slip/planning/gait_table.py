@@ -9,16 +9,20 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.embedding.planners.lqr import CONTROL_WEIGHT, LqrOptions
 from template_control.slip.automaton.vocabulary import Slot, StrideKind
-from template_control.slip.control.lqr import lqr, settling_map
+from template_control.slip.control.lqr import (
+    CONTROL_WEIGHT,
+    SETTLED_TOLERANCE,
+    lqr,
+    settling_map,
+)
 from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WALKING_SLOTS
 from template_control.slip.gaits.walking_by_speed import Chain, walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.similarity import Scale, scaled
+from template_control.slip.similarity import Scale
 
 CONTROLS = 4
 """Controls of a step: alpha, kappa_1, kappa_2, kappa_p."""
@@ -102,7 +106,7 @@ def gait_table(parameters: SlipParameters) -> GaitTable:
 def _rows(chain: Chain, p: SlipParameters) -> Array:
     """(n, WIDTH) of a chain's knots, which are gaits to rounding."""
     scale = Scale.of(p)
-    tolerance = np.array(scaled(LqrOptions(), scale).tolerance)
+    tolerance = np.array(SETTLED_TOLERANCE) * scale.state
     unit, weight = p.speed_unit, p.mass * p.gravity / p.rest_length
     step, q = ReturnMap(p, STRIDE), np.diag(1.0 / np.square(STATE_TOLERANCE * scale.state))
     r = np.diag(1.0 / CONTROL_TOLERANCE**2)

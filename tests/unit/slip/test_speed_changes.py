@@ -10,9 +10,11 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.embedding.planners import change_search
-from template_control.embedding.planners.change_search import SPEEDS, search_changes
-from template_control.embedding.planners.gait_table import (
+from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
+from template_control.slip.maps.return_map import LANDING_TIME, LIFTED_TIME, REAR_BOTTOM, ReturnMap
+from template_control.slip.planning import change_search
+from template_control.slip.planning.change_search import SPEEDS, search_changes
+from template_control.slip.planning.gait_table import (
     CONTROL,
     SLOTS,
     STATE,
@@ -20,11 +22,9 @@ from template_control.embedding.planners.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.embedding.planners.look_ahead import DEFECT
-from template_control.embedding.planners.lqr import KNEE_STRAIGHT
-from template_control.embedding.planners.speed_changes import speed_changes
-from template_control.slip.automaton.vocabulary import NUM_SLOTS, Outcome
-from template_control.slip.maps.return_map import LANDING_TIME, LIFTED_TIME, REAR_BOTTOM, ReturnMap
+from template_control.slip.planning.limits import KNEE_STRAIGHT
+from template_control.slip.planning.look_ahead import DEFECT
+from template_control.slip.planning.speed_changes import speed_changes
 
 P = tc.SlipParameters()
 KNEES = 320.0  # [N m]
@@ -113,7 +113,7 @@ def test_the_command_writes_what_the_library_reads(monkeypatch, tmp_path, capsys
     assert main(["gaits", "--changes", "--output", str(tmp_path)]) == 0
     assert "steps" in capsys.readouterr().out
     made = json.loads((tmp_path / "speed_changes.json").read_text())
-    place = files("template_control.embedding.planners").joinpath("speed_changes.json")
+    place = files("template_control.slip.planning").joinpath("speed_changes.json")
     shipped = json.loads(place.read_text())
     assert made.keys() == shipped.keys()
     assert made["changes"][0].keys() == shipped["changes"][0].keys()

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from template_control.embedding.pressure import (
+from template_control.embedding.standing.curves import BetweenFeet, StandingOptions
+from template_control.slip.dynamics.timed import polynomial
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.pressure import (
     ARRIVE,
     SMOOTH,
     UNLOADING,
@@ -17,9 +20,6 @@ from template_control.embedding.pressure import (
     bounded,
     pressure,
 )
-from template_control.embedding.standing.curves import BetweenFeet, StandingOptions
-from template_control.slip.dynamics.timed import polynomial
-from template_control.slip.parameters import SlipParameters
 
 P = SlipParameters()
 OPTIONS = StandingOptions(half_length=0.5)

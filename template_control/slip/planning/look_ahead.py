@@ -20,19 +20,6 @@ import numpy as np
 
 from template_control.arrays import Array, IntArray
 from template_control.compiled import compiled, inner, inner_by_type
-from template_control.embedding.planners.gait_table import (
-    CONTROLS,
-    FACTOR,
-    SETTLING,
-    SLOTS,
-    STATE,
-    STATE_TOLERANCE,
-    STIFFNESS,
-    WIDTH,
-    GaitTable,
-    gait_row,
-)
-from template_control.embedding.planners.lqr import ANGLE_RANGE
 from template_control.slip.automaton.vocabulary import NUM_SLOTS
 from template_control.slip.control.broyden import LinearMap, carried
 from template_control.slip.control.least_squares import (
@@ -45,7 +32,6 @@ from template_control.slip.control.least_squares import (
 from template_control.slip.control.stride_solver import of_type
 from template_control.slip.control.touchdown import steepest
 from template_control.slip.dynamics.kernel import scratch_of
-from template_control.slip.dynamics.model import Kernel
 from template_control.slip.maps.return_map import (
     LANDING_TIME,
     LIFTED_TIME,
@@ -56,15 +42,28 @@ from template_control.slip.maps.return_map import (
     recorded_jacobian,
     recorded_stride,
 )
-from template_control.structured import Kept
+from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.gait_table import (
+    CONTROLS,
+    FACTOR,
+    SETTLING,
+    SLOTS,
+    STATE,
+    STATE_TOLERANCE,
+    STIFFNESS,
+    WIDTH,
+    gait_row,
+)
+from template_control.slip.planning.limits import ANGLE_RANGE, ANY_ANGLE, WalkLimits
+from template_control.slip.planning.plan_costs import PlanCosts, plan_costs
+from template_control.structured import Kept, keep
+from template_control.warm_up import Part
 
 BOUNDS = np.array([[ANGLE_RANGE[0], 0.35, 0.35, 0.35], [ANGLE_RANGE[1], 1.5, 1.5, 1.5]])
 """(2, 4) least and greatest alpha relative to the reference's [rad], and stiffnesses over k.
 
 What a softer leg does to the knees is a limit of its own here; with 0.5 speeds change later.
 """
-DEGREE, TOLERANCE = 10, 1e-6
-"""Of the series of a plan's steps: off by 3e-5 m/s and 3e-6 m at most, in half the time."""
 STATES = 3
 """Of a section at VLO."""
 BLOCK = CONTROLS + STATES
@@ -79,33 +78,11 @@ PER_STEP = _SHORT + 1
 the knees bear beyond (the rear and the front leg at the virtual bottom, the rear leg just after
 touchdown, the stance leg at the VLO before and after), and what the swing is too short."""
 _KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
-TOO_SHORT = 0.004
-"""Time by which a swing is too short and costs 1 [s], for the reference."""
-DEFECT = np.array([0.004, 0.0008, 0.008])
-"""Differences between a step's end and the next one's start that cost 1, for the reference."""
 SMALL = np.array([0.03, 0.003, 0.04])
 """Changes of a state over which a step is to be nearly linear, for the reference."""
 _LENGTH = 0.004  # of a leg's reach, by which a knee's moment changes by about as much as costs 1
 SEARCH = Search(rounds=8, close=0.03, grid=0, save=0.02, damping=1e-3)
 """Gauss-Newton steps of a plan."""
-
-
-class PlanCosts(NamedTuple):
-    """Model and costs of every plan."""
-
-    kernel: Kernel  # the step
-    table: GaitTable  # of the gaits that plans lead to
-    defect: Array  # (3,) differences between a step's end and the next one's start that cost 1
-    tolerance: Array  # (3,) differences of the states that cost 1
-    control_tolerance: Array  # (4,) differences of alpha [rad] and of the shares that cost 1
-    rise: tuple[float, float]  # |dy/dt| that costs nothing, and what is beyond and costs 1 [m/s]
-    knee_reach: float  # length of the leg at which the knee is straight [m]
-    knee_moment: float  # of the leg force about the knee that costs nothing [N m]
-    earliest: float  # time from VLO to the touchdown at the least [s]
-    swing: float  # the same from the foot's liftoff [s]
-    short: float  # time that one of them is too short and costs 1 [s]
-    unit: Array  # (3,) of states, those of the reference template being 1
-    columns: IntArray  # (7,) of the map's derivatives, states and controls
 
 
 class Reference(NamedTuple):
@@ -462,3 +439,14 @@ def make_plan(
     if excess <= judged[0] and cost <= judged[1]:
         error = roughness(p, x, 0)
     return cost, excess, error
+
+
+def plan_ahead() -> None:
+    """The compiled plan, so that a helper process can compile it."""
+    costs = plan_costs(SlipParameters(), WalkLimits(np.inf, (0.0, 1.0), 0.0))
+    problem = new_problem(costs, 1)
+    make_plan(keep(problem), (1.0, True), ANY_ANGLE, SEARCH, (-1.0, 0.0), np.ones(CONTROLS))
+
+
+AHEAD = (Part(plan_ahead, 10.0),)
+"""Compiled functions of a plan, in addition to a walk's."""

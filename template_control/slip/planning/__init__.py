@@ -1,0 +1,1 @@
+"""Plans of several walking steps, and of the centre of pressure."""
