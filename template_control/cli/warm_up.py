@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
     ready((*CONTROL, *RECORD, *DELAY, *WALK))
     # These call the first ones; not each other, but for the floating base.
     others = (Part(scenarios, 1.0), Part(basins, 1.2), Part(ideal_plant, 1.8))
-    ready((*READ, *LATERAL, Part(floating_base, 17.0), *AHEAD, *PRESSURE, *others))
+    ready((*READ, *LATERAL, Part(floating_base, 26.0), *AHEAD, *PRESSURE, *others))
     plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
     return 0
 

@@ -205,15 +205,13 @@ def advance(kept: Any, dt: float) -> None:
     t, r, want = tick[0], data[0], references[0]
     mode, s = t.mode, t.sensed
     move_clock(t.path, curve, s, mode, want, (r.com_velocity[0], dt))
-    move_swings(t, r, want, dt)
-    _move_in_space(t, r, want, lateral, dt)
     for i in range(4):
         want.com_now[i] = s.state[i]
     want.com_now[0] -= s.toes[0]
     want.com_push = t.trim if mode.trim_momentum else 0.0
     want.lead, want.ahead = t.path.offset, np.nan
-    if t.lateral.half_width > 0.0:
-        sway(t, r, want, curve)
+    move_swings(t, r, want, dt)
+    _move_in_space(t, r, want, curve, lateral, dt)
     want.pitch = advance_lean(t.lean, r.attitude[1] - t.frame.angle, dt) + t.frame.angle
     for leg in range(LEGS):
         want.feet[leg] = t.feet.roles[leg]
@@ -277,7 +275,14 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
 
 
 @compiled
-def _move_in_space(t: Any, r: Any, want: Any, lateral: tuple[Any, ...] | None, dt: float) -> None:
+def _move_in_space(
+    t: Any,
+    r: Any,
+    want: Any,
+    curve: tuple[Array, Array, Array],
+    lateral: tuple[Any, ...] | None,
+    dt: float,
+) -> None:
     """Move on what only a floating-base robot has; of a planar one, whose ``lateral`` is None, not.
 
     The None is an argument of its own, so that Numba leaves out what is not called.
@@ -286,6 +291,8 @@ def _move_in_space(t: Any, r: Any, want: Any, lateral: tuple[Any, ...] | None, d
         _swing_sideways(t, r, want, lateral, dt)
         _turn(t, want, dt)
         _place_contacts(t, r, want)
+        if t.lateral.half_width > 0.0:
+            sway(t, r, want, curve)
 
 
 @compiled
@@ -431,5 +438,5 @@ def whole_tick() -> None:
     act(kept, qp.answer_arrays(), 1e-3)
 
 
-CONTROL = (Part(whole_tick, 28.0),)
+CONTROL = (Part(whole_tick, 18.0),)
 """Compiled functions of a tick."""

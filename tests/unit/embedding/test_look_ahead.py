@@ -9,13 +9,10 @@ import pytest
 import template_control as tc
 from template_control.cli.main import main
 from template_control.embedding.planners.ahead import (
-    RISE,
     SPACING,
     AheadOptions,
     AheadPlanner,
-    WalkLimits,
     check_feasibility,
-    plan_costs,
 )
 from template_control.embedding.planners.planner import Cause, Context
 from template_control.errors import ScenarioError
@@ -42,7 +39,7 @@ from template_control.slip.planning.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.slip.planning.limits import ANY_ANGLE, KNEE_MOMENT
+from template_control.slip.planning.limits import ANY_ANGLE, KNEE_MOMENT, WalkLimits
 from template_control.slip.planning.look_ahead import (
     BLOCK,
     BOUNDS,
@@ -57,6 +54,7 @@ from template_control.slip.planning.look_ahead import (
     roughness,
     step_controls,
 )
+from template_control.slip.planning.plan_costs import RISE, plan_costs
 from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.structured import keep
@@ -88,7 +86,7 @@ def table():
 def problem_from(z, speed, steps=3, **changes):
     """A plan that is to be near a gait, and its start."""
     limits = WalkLimits(KNEES, (0.2, 1.4), 0.155)
-    p = new_problem(plan_costs(P, OPTIONS, limits)._replace(**changes), steps)
+    p = new_problem(plan_costs(P, limits, OPTIONS.ease)._replace(**changes), steps)
     row = row_at(table(), speed)
     p.start[:], p.offset[:] = z, 0.0
     r = p.reference

@@ -29,7 +29,7 @@ from template_control.slip.maps.return_map import (
 )
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.planning.look_ahead import DEFECT
+from template_control.slip.planning.plan_costs import DEFECT
 
 P = SlipParameters()
 K0 = P.leg_stiffness
