@@ -358,10 +358,11 @@ def _fallen(
     supervisor, patience = controller.supervisor, falls.patience
     duration = controller.planner.gait.step_duration
     lasts, longest = now - supervisor.begun_at, patience * duration
-    # A stop may be planned to take longer; one that is planned again and again is none.
-    rests = supervisor.planned_at + supervisor.time_of(Event.REST) + duration
-    if lasts > longest and not (now < rests < inf and lasts < 2.0 * longest):
-        return "the robot stopped walking"
+    if lasts > longest:
+        # A stop may be planned to take longer; one that is planned again and again is none.
+        rests = supervisor.planned_at + supervisor.time_of(Event.REST) + duration
+        if not (now < rests < inf and lasts < 2.0 * longest):
+            return "the robot stopped walking"
     if plant.trunk_touches_ground():
         return "the trunk touched the ground"
     return ""

@@ -35,8 +35,6 @@ from template_control.slip.control.lqr import (
 )
 from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.control.stride_solver import Prior, solve_stride
-from template_control.slip.dynamics.kernel import new_scratch
-from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.gaits.gait import (
     GaitFamily,
     WalkingGait,
@@ -179,7 +177,7 @@ class LqrPlanner(Planner):
         self.options = scaled(options or LqrOptions(), self._scale)
         self.offset: Array = np.zeros(3)
         self._family = GaitFamily(gait, other_walks)
-        self._scratch = new_scratch()
+        self._knee_moment = usual_knee_moment(gait.parameters)
         self._slope = 0.0
         self._settle_on(gait)
 
@@ -191,6 +189,7 @@ class LqrPlanner(Planner):
         except GaitError:
             self._slope = 0.0
         self._here, (self._slots, self._units) = here, control_units(here)
+        self._map = ReturnMap(here.parameters, here.stride)
         self._pushes = int(Slot.K_PUSH) in self._slots
         self.a, self.b = vlo_jacobians(here)
         o = self.options
@@ -255,9 +254,9 @@ class LqrPlanner(Planner):
             earliest=min(o.earliest_touchdown, o.earliest_share * self.gait.step_duration),
             stiffness=p.leg_stiffness,
             knee_reach=KNEE_STRAIGHT * self._scale.length,
-            knee_moment=usual_knee_moment(p),
+            knee_moment=self._knee_moment,
             knee_price=o.knee_load_price,
-            kernel=stride_kernel(p, self._here.stride),
+            kernel=self._map.kernel[0],
         )
 
     def _settled(self, shift: Array) -> Array:
@@ -271,11 +270,10 @@ class LqrPlanner(Planner):
         if not self._pushes:
             return linear
         slots, units, tolerance = self._slots, self._units, np.array(self.options.tolerance)
-        step = ReturnMap(self._here.parameters, self._here.stride)
         for _ in range(_ROUNDS):
             z, u = self._here.vlo + shift[:3], self._here.controls.copy()
             u[slots] += shift[3:] * units
-            here = step.linearise(z, u)
+            here = self._map.linearise(z, u)
             if here.outcome is not Outcome.SECTION:
                 return linear
             a, b = here.state_jacobian, here.control_jacobian[:, slots] * units
@@ -298,7 +296,7 @@ class LqrPlanner(Planner):
         upper[0] = max(min(upper[0], angles[1]), lower[0])
         law = self._law._replace(lower=lower, upper=upper)
         u, first = np.empty(len(lower)), np.empty(3)
-        cost, own = choose(law, self._scratch, context.z, u, first)
+        cost, own = choose(law, self._map.work.scratch, context.z, u, first)
         controls = self._here.controls.copy()
         controls[self._slots] = u * self._units
         nominal = own and reachable
@@ -307,7 +305,7 @@ class LqrPlanner(Planner):
     def cost(self, z: Array) -> float:
         """See :meth:`~.planner.Planner.cost`: with the step after the next."""
         u, first = np.empty(len(self._slots)), np.empty(3)
-        return float(choose(self._law, self._scratch, z, u, first)[0])
+        return float(choose(self._law, self._map.work.scratch, z, u, first)[0])
 
     def decide_rest(self, context: RestContext) -> Decision | None:
         """See :meth:`~.planner.Planner.decide_rest`; nothing breaks into a walking step.
