@@ -222,7 +222,8 @@ class StrideSupervisor:
         if due == STRAYED:
             self._speed_excess += deviation
         if due == LEADS_NOWHERE and not self._recovering:
-            retries = not self.decision.feasible or self.planner.retries
+            goes_on = self.decision.feasible and self.path.strides[0].completed
+            retries = self.planner.retries or not goes_on
             if self._along_curve or not retries:  # a curve is left to its planner
                 return None
         return _CAUSES.get(due)

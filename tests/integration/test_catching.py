@@ -237,27 +237,41 @@ def test_a_robot_that_is_pushed_too_hard_runs_and_walks_on(name, phase):
 
 
 @pytest.mark.slow(seconds=6)
-def test_a_walk_of_a_scenario_runs_and_walks_on():
+@pytest.mark.parametrize(("push_off", "step"), [(False, "w"), (True, "wp")])
+def test_a_walk_of_a_scenario_runs_and_walks_on(push_off, step):
     segments = (Segment("walk", 1.1, steps=7),)
     scenario = Scenario(segments=segments, start=(1.1, 0.978, 0.0), map_kind=tc.MapKind.EXACT)
     robot = tc.load_robot("five-link")
-    route = robot_route(robot, scenario, push_off=False)  # steps with push-off know no run
     pushes = (tc.Push(60.0, step=2, phase=0.3),)
-    record = tc.simulate(tc.Experiment(robot, route, pushes=pushes))
+
+    def walked(**controller):
+        route = robot_route(robot, scenario, push_off=push_off)
+        options = tc.EmbeddingOptions(**controller)
+        return tc.simulate(tc.Experiment(robot, route, pushes=pushes, controller=options))
+
+    record = walked()
     assert record.arrived
     found = kinds(record)
     runs = found.count("r")
     assert runs >= 3
-    assert found == ["w"] * 2 + ["wr"] + ["r"] * runs + ["rw"] + ["w"] * 4, "caught, it is a step"
-    fallen = tc.simulate(
-        tc.Experiment(
-            robot,
-            robot_route(robot, scenario, push_off=False),
-            pushes=pushes,
-            controller=tc.EmbeddingOptions(catches=False),
-        )
-    )
-    assert set(kinds(fallen)) == {"w"}
+    assert found == [step] * 2 + ["wr"] + ["r"] * runs + ["rw"] + [step] * 4, "caught, it is a step"
+    assert set(kinds(walked(catches=False))) == {step}
+
+
+@pytest.mark.slow(seconds=4)
+def test_a_walk_of_any_speed_runs_and_walks_on():
+    robot = tc.load_robot("five-link")
+    route = tc.SpeedRoute(tc.template_for(robot), tc.SpeedProfile((0.0, 9.0), (1.0, 1.0)), 9.0)
+    pushes = (tc.Push(80.0, step=3, phase=0.7),)
+    record = tc.simulate(tc.Experiment(robot, route, pushes=pushes))
+    assert record.fall_reason == ""
+    assert record.arrived
+    found = kinds(record)
+    runs = found.count("r")
+    assert runs >= 3
+    assert found[:4] == ["wp"] * 3 + ["wr"]
+    assert set(found[4 + runs + 1 :]) == {"wp"}
+    assert record.section_state[-1, 0] == pytest.approx(1.0, abs=0.06)
 
 
 @pytest.mark.slow(seconds=4)

@@ -87,7 +87,8 @@ def default_planners(
 
     That is walking steps for a route that begins at VLO, running ones for one at an apex, and
     standing for one that stands, and starts and stops where it is a scenario. A
-    route whose walk has any speed is walked with the planner that looks several steps ahead.
+    route whose walk has any speed is walked with the planner that looks several steps ahead. Each
+    walk comes with the strides that it may break into (``EmbeddingOptions.catches``).
 
     Args:
         route: whose template and first target they are for.
@@ -114,8 +115,6 @@ def default_planners(
     )
     if any_speed:
         walk = walking or AheadPlanner(p, speed=speed)
-        if not (isinstance(route, SpeedRoute) and "run" in route.gaits):
-            return {walk.gait.stride: walk, **stands}
     else:
         walk = walking or LqrPlanner(walking_gait(p, speed))
 

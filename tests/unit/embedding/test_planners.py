@@ -308,6 +308,19 @@ def test_a_step_that_does_not_go_on_is_tried_again_and_again(gait):
     assert supervisor.surprise(node, 0.0, 0.03, 0.06) is None
 
 
+def test_a_stride_that_is_not_completed_is_planned_again_by_any_planner(gait):
+    supervisor = planned(gait)
+    supervisor.planners["w"].retries = False
+    sensed = TemplateState(VLO.state(gait.vlo), np.zeros(2))
+    node = supervisor.decide(VLO, sensed, 0.0, NOTHING)
+    assert supervisor.decision.feasible
+    assert supervisor.surprise(node, 0.0, 0.03, 0.03) is None, "it goes on"
+    sensed.state[2] = 0.1  # it falls back
+    supervisor.follow(node, sensed, 0.03)
+    assert supervisor.decision.feasible, "as it was decided"
+    assert supervisor.surprise(node, 0.0, 0.03, 0.06) is Cause.NO_FUTURE
+
+
 def test_a_stride_may_have_come_here_on_the_legs_of_the_gait(gait):
     """With legs so stiff the CoM was in the air before."""
     node, supervisor = AUTOMATON.node(STRIDE_START["w"]), planned(gait)
