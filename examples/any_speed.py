@@ -88,8 +88,11 @@ def follow(
     off = speed[1:] - record.section_target[:-1, 0]
     ended = f"FELL: {summary['fall_reason']}" if record.fell else "no fall"
     accepted, torques = summary["accepted_speed"], summary["joint_torque"].values()
+    kinds = record.kinds_of_stride
+    others = sum(kind != kinds[0] for kind in kinds) if isinstance(profile, tc.SpeedProfile) else 0
+    caught = f" ({others} strides that catch it)" if others else ""
     print(
-        f"{name}: {ended}, {record.steps} steps in {summary['duration']:.1f} s,"
+        f"{name}: {ended}, {record.steps} steps{caught} in {summary['duration']:.1f} s,"
         f" {speed.min():.2f} to {speed.max():.2f} m/s at VLO,"
         f" off the wanted {np.sqrt(np.mean(off**2)):.3f} m/s RMS,"
         f" off the accepted {accepted['error_rms']:.3f} m/s RMS,"

@@ -271,7 +271,9 @@ def test_a_walk_of_any_speed_runs_and_walks_on():
     assert runs >= 3
     assert found[:4] == ["wp"] * 3 + ["wr"]
     assert set(found[4 + runs + 1 :]) == {"wp"}
-    assert record.section_state[-1, 0] == pytest.approx(1.0, abs=0.06)
+    speed = record.section_state[:, 0]
+    assert speed.max() > 1.9
+    assert speed[-1] == pytest.approx(speed[0], abs=0.02), "at VLO, where 1 m/s are 0.91"
 
 
 @pytest.mark.slow(seconds=4)
