@@ -11,7 +11,6 @@ from .phases import Clock as Clock
 from .phases import PhaseControl as PhaseControl
 from .planners.ahead import AheadOptions as AheadOptions
 from .planners.ahead import AheadPlanner as AheadPlanner
-from .planners.ahead import check_feasibility as check_feasibility
 from .planners.default import default_planners as default_planners
 from .planners.lqr import LqrOptions as LqrOptions
 from .planners.lqr import LqrPlanner as LqrPlanner

@@ -36,7 +36,7 @@ from template_control.slip.gaits.walking_by_speed import (
 )
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.planning.limits import WalkLimits, usual_knee_moment
+from template_control.slip.planning.plan_costs import WalkLimits, usual_knee_moment
 from template_control.slip.similarity import REFERENCE, Scale
 
 _TOUCHDOWN = float(np.radians(66.0))

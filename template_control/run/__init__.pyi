@@ -17,6 +17,7 @@ from .record import RunInterrupted as RunInterrupted
 from .record import SoleRecord as SoleRecord
 from .record import load_record as load_record
 from .recorder import Recorder as Recorder
+from .robot_route import check_feasibility as check_feasibility
 from .robot_route import robot_route as robot_route
 from .sensing import SensorOptions as SensorOptions
 from .simulation import simulate as simulate

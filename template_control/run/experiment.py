@@ -21,14 +21,12 @@ from template_control.embedding.options import EmbeddingOptions
 from template_control.embedding.planners.ahead import (
     AheadOptions,
     AheadPlanner,
-    check_feasibility,
 )
 from template_control.embedding.planners.default import default_planners, first_speed
 from template_control.embedding.planners.lqr import WALK, LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
-from template_control.embedding.standing.curves import standing_options
 from template_control.embedding.tick import CONTROL
 from template_control.errors import ParameterError
 from template_control.estimation.imu import ImuOptions
@@ -45,7 +43,7 @@ from template_control.robot.template import (
     walk_limits,
 )
 from template_control.run.options import FallOptions, HeadingCommand, Push, check_pushes
-from template_control.run.robot_route import robot_route
+from template_control.run.robot_route import check_feasibility, robot_route, standing_options
 from template_control.run.sensing import SensorOptions
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
 from template_control.run.velocity import (

@@ -13,14 +13,12 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Range
 from template_control.embedding.planners.lqr import WALK, LqrPlanner
 from template_control.embedding.planners.planner import Context, Decision, Planner
-from template_control.errors import ScenarioError
-from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.control.least_squares import Search
-from template_control.slip.dynamics.stride import StrideSimulator, controls
+from template_control.slip.dynamics.stride import controls
 from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.maps.section import PADDED, VLO
+from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.planning.gait_table import (
     CONTROL,
@@ -34,7 +32,6 @@ from template_control.slip.planning.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.slip.planning.limits import SWING, WalkLimits, usual_knee_moment
 from template_control.slip.planning.look_ahead import (
     AHEAD,
     SEARCH,
@@ -43,9 +40,13 @@ from template_control.slip.planning.look_ahead import (
     new_problem,
     step_controls,
 )
-from template_control.slip.planning.plan_costs import plan_costs
+from template_control.slip.planning.plan_costs import (
+    SWING,
+    WalkLimits,
+    plan_costs,
+    usual_knee_moment,
+)
 from template_control.slip.planning.speed_changes import SpeedChange, speed_changes
-from template_control.slip.scenario.route import Route
 from template_control.slip.similarity import SPEED, Scale, scaled, tuned
 from template_control.structured import Kept, keep
 from template_control.warm_up import ready
@@ -65,8 +66,6 @@ _ROUGHEST = 1.5  # and the roughness of its first step; slow gaits have up to 2,
 # Pace with heavy legs [m/s], for the reference template: with twice as much 2 of 10 random profiles
 # of rabbit ended in a fall, with changes of the table 5.
 _HEAVY_PACE = 0.15
-_BEHIND = 0.08  # of the wanted speed, that is none [m/s], for the reference
-_MOST_STRIDES = 1000  # that are rehearsed, of a route that does not end
 
 
 @dataclass(frozen=True)
@@ -326,34 +325,3 @@ class AheadPlanner(Planner):
         """See :meth:`~.planner.Planner.observe`; only feasible, nominal steps change the offset."""
         self._lqr.observe(decision, z)
         self.offset = self._lqr.offset
-
-
-def check_feasibility(route: Route, planner: AheadPlanner) -> None:
-    """Walk a route on the template, and refuse it where a step would be behind.
-
-    Args:
-        route: of walking steps; it is reset before and after.
-        planner: of these steps; it learns nothing.
-
-    Raises:
-        ScenarioError: naming the first speed that cannot be had in time.
-    """
-    simulator, unit = StrideSimulator(route.parameters, AUTOMATON), Scale.of(route.parameters).speed
-    route.reset()
-    z, now = np.array(route.start), 0.0
-    for _ in range(_MOST_STRIDES):
-        if (goal := route.next(VLO, z, now)) is None:
-            break
-        decision = planner.decide(Context(z, goal.target))
-        wanted, had = float(goal.target[0]), float(decision.predicted[0])
-        if not decision.feasible or abs(had - wanted) > _BEHIND * unit:
-            raise ScenarioError(
-                f"segment {goal.segment + 1} wants {wanted:.3g} m/s at VLO {now:.1f} s after the"
-                f" start, and {had:.3g} m/s can be had then: give a smaller acceleration or"
-                " change of speed, or leave out --strict"
-            )
-        node = AUTOMATON.start(goal.stride).name
-        stride = simulator.run(node, VLO.state(z), decision.controls)
-        z, now = VLO.of(stride.state), now + stride.duration
-    route.reset()
-    planner.reset()

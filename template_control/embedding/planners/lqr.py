@@ -45,7 +45,7 @@ from template_control.slip.gaits.gait import (
 from template_control.slip.gaits.walking_by_speed import other_walks
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.planning.limits import (
+from template_control.slip.planning.plan_costs import (
     ANGLE_RANGE,
     KNEE_STRAIGHT,
     STIFFNESS_RANGE,

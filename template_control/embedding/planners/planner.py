@@ -18,11 +18,11 @@ from template_control.checks.ranges import Shape
 from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Slot
 from template_control.slip.control.stride_solver import StrideEnd
+from template_control.slip.control.touchdown import ANY_ANGLE
 from template_control.slip.dynamics.stride import Stride
 from template_control.slip.gaits.gait import Gait
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.planning.limits import ANY_ANGLE
 
 
 @dataclass(frozen=True)

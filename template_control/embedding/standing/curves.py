@@ -18,10 +18,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
-from template_control.embedding.free.options import SOLE_STAND
-from template_control.robot.biped import Biped
 from template_control.robot.start import Pose
-from template_control.robot.template import template_for
 from template_control.slip.dynamics.timed import Quintic
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.planning.catching import CatchingStep
@@ -43,13 +40,6 @@ CLOSING = 0.25
 """Distance of the feet after a step from a stand, and where a walk ends, over l0."""
 PLACE = 0.5
 """Place of the CoM between the feet, as a share of their spacing from the rear one."""
-
-_LIFTED = 0.03  # shortest time on a pair of feet before VLO; the other has nothing to pass [s]
-_PASSED = 0.08  # the same on a sole: the other one, a step behind, swings past it [s]
-_SHIFT = 0.8  # time in which a CoM at rest moves over one of two soles or pairs [s], for l0 = 1 m
-# dx/dt at VLO of a start [m/s], for l0 = 1 m. The step of G1 after a slow one takes a second, and
-# it falls sideways: in 8 of 12 starts at 0.13 to 0.21 m/s, and in none of 9 at 0.26 or more.
-_SLOWEST_START = 0.3
 
 
 @dataclass(frozen=True)
@@ -82,20 +72,6 @@ class StandingOptions(Checked):
     shift: NotNegative = tuned(0.0, TIME)
     single: NotNegative = tuned(0.15, TIME)
     slowest: NotNegative = tuned(0.0, SPEED)
-
-
-def standing_options(robot: Biped) -> StandingOptions:
-    """Options of a robot's stand, for the reference template; the height is the library's."""
-    if not robot.half_length:
-        return StandingOptions()
-    length = Scale.of(template_for(robot)).length
-    half = robot.half_length / length
-    if not robot.patches:
-        return StandingOptions(half_length=half, shift=_SHIFT, single=_LIFTED)
-    slant = SOLE_SHARE * robot.half_width / (SOLE_STAND * length)
-    return StandingOptions(
-        half_length=half, slant=slant, shift=_SHIFT, single=_PASSED, slowest=_SLOWEST_START
-    )
 
 
 @checked

@@ -10,6 +10,9 @@ from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.parameters import SlipParameters
 
+ANY_ANGLE = (-np.inf, np.inf)
+"""Range of angles that leaves the touchdown angle free."""
+
 _NEWTON = 4
 TOP_MARGIN = 0.01
 """Distance of alpha below asin(y / l0), at which the foot would touch down at once [rad]."""

@@ -16,6 +16,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.slip.automaton.automaton import STRIDE_START
 from template_control.slip.control.least_squares import Search
+from template_control.slip.control.touchdown import ANY_ANGLE
 from template_control.slip.dynamics.stride import simulate_stride
 from template_control.slip.maps.return_map import LIFTED_TIME, ReturnMap
 from template_control.slip.maps.section import VLO
@@ -29,7 +30,6 @@ from template_control.slip.planning.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.slip.planning.limits import ANY_ANGLE, SWING, WalkLimits
 from template_control.slip.planning.look_ahead import (
     BLOCK,
     STATES,
@@ -40,7 +40,7 @@ from template_control.slip.planning.look_ahead import (
     roughness,
     step_controls,
 )
-from template_control.slip.planning.plan_costs import PlanCosts, plan_costs
+from template_control.slip.planning.plan_costs import SWING, PlanCosts, WalkLimits, plan_costs
 from template_control.slip.planning.speed_changes import SpeedChange
 from template_control.slip.similarity import REFERENCE
 

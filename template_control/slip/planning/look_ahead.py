@@ -30,7 +30,7 @@ from template_control.slip.control.least_squares import (
     slopes,
 )
 from template_control.slip.control.stride_solver import of_type
-from template_control.slip.control.touchdown import steepest
+from template_control.slip.control.touchdown import ANY_ANGLE, steepest
 from template_control.slip.dynamics.kernel import scratch_of
 from template_control.slip.maps.return_map import (
     LANDING_TIME,
@@ -54,8 +54,7 @@ from template_control.slip.planning.gait_table import (
     WIDTH,
     gait_row,
 )
-from template_control.slip.planning.limits import ANGLE_RANGE, ANY_ANGLE, WalkLimits
-from template_control.slip.planning.plan_costs import PlanCosts, plan_costs
+from template_control.slip.planning.plan_costs import ANGLE_RANGE, PlanCosts, WalkLimits, plan_costs
 from template_control.structured import Kept, keep
 from template_control.warm_up import Part
 

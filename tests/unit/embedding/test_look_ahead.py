@@ -12,16 +12,16 @@ from template_control.embedding.planners.ahead import (
     SPACING,
     AheadOptions,
     AheadPlanner,
-    check_feasibility,
 )
 from template_control.embedding.planners.planner import Cause, Context
 from template_control.errors import ScenarioError
 from template_control.robot.template import walk_limits
+from template_control.run.robot_route import check_feasibility
 from template_control.run.summary import summarise
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Outcome
 from template_control.slip.control.least_squares import Search
-from template_control.slip.control.touchdown import TOP_MARGIN
+from template_control.slip.control.touchdown import ANY_ANGLE, TOP_MARGIN
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.walking_by_speed import walking_by_speed
@@ -39,7 +39,6 @@ from template_control.slip.planning.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.slip.planning.limits import ANY_ANGLE, KNEE_MOMENT, WalkLimits
 from template_control.slip.planning.look_ahead import (
     BLOCK,
     BOUNDS,
@@ -54,7 +53,7 @@ from template_control.slip.planning.look_ahead import (
     roughness,
     step_controls,
 )
-from template_control.slip.planning.plan_costs import RISE, plan_costs
+from template_control.slip.planning.plan_costs import KNEE_MOMENT, RISE, WalkLimits, plan_costs
 from template_control.slip.scenario.route import SpeedProfile
 from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.structured import keep

@@ -22,8 +22,7 @@ from template_control.slip.planning.gait_table import (
     gait_table,
     row_at,
 )
-from template_control.slip.planning.limits import KNEE_STRAIGHT
-from template_control.slip.planning.plan_costs import DEFECT
+from template_control.slip.planning.plan_costs import DEFECT, KNEE_STRAIGHT
 from template_control.slip.planning.speed_changes import speed_changes
 
 P = tc.SlipParameters()
