@@ -1,1 +1,1 @@
-"""Plans of several walking steps, and of the centre of pressure."""
+"""Plans of several walking steps, of the centre of pressure, and of a step that catches."""

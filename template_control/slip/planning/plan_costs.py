@@ -52,7 +52,7 @@ def usual_knee_moment(parameters: SlipParameters) -> float:
 
 
 class WalkLimits(NamedTuple):
-    """What a robot's legs allow of its walks.
+    """Limits of a robot's walks, by its legs.
 
     Attributes:
         knee_moment: of the template's leg force about the knees [N m].
@@ -86,8 +86,9 @@ class PlanCosts(NamedTuple):
 
 
 def plan_costs(parameters: SlipParameters, limits: WalkLimits, ease: float = 1.0) -> PlanCosts:
-    """Model and costs of the plans on a template; ``ease`` are their controls' tolerances, over
-    the usual ones.
+    """Model and costs of the plans on a template.
+
+    ``ease`` are the tolerances of the controls, over the usual ones.
     """
     scale = Scale.of(parameters)
     beyond, tolerance = RISE
