@@ -1,7 +1,7 @@
 """Lateral motion over feet that bear a moment: as the gait's, or by a plan of their pressure.
 
 Where both feet stand and the CoM follows a curve in time, and in a step from a stand, the lateral
-motion is planned as the curve's x is: by the quadratic program of :mod:`~..pressure`
+motion is planned as the curve's x is: by the quadratic program of :mod:`~.planning.pressure`
 through the phases that are to come, each with the feet that stand in it.
 
 ``t`` is of ``TICK``, ``r`` of ``ROBOT_DATA``, ``want`` of ``REFERENCES``, ``curve`` the path's.

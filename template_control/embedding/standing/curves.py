@@ -1,8 +1,8 @@
 """Curves of the CoM between two feet on the ground: to rest, or to where the rear foot lifts off.
 
-The centre of pressure is planned by the quadratic program of :mod:`~.pressure`. It is anywhere
-between the feet; pairs of feet and soles, which bear a moment, have it beyond the middle of either
-one too.
+The centre of pressure is planned by the quadratic program of :mod:`~.planning.pressure`. It is
+anywhere between the feet; pairs of feet and soles, which bear a moment, have it beyond the middle
+of either one too.
 """
 
 from __future__ import annotations
