@@ -154,11 +154,12 @@ class EmbeddingController:
             self.lateral = LateralMotion(robot, self.parameters, given, *keeps)
         self.memory = tick, robot.data, self.references.data
         self._memory = *self.memory, self.qp.data
+        self._sensed = keep(self._memory)
 
     @property
     def time(self) -> float:
         """Since the start [s]."""
-        return float(self._tick["time"][0])
+        return float(self._tick["time"].item())
 
     @property
     def node(self) -> Node:
@@ -261,7 +262,7 @@ class EmbeddingController:
         felt = NO_FORCE if force is None or self.lateral is not None else force
         if not self.frame.of_world:
             felt = self.frame.inward(felt)
-        found = sense(*self._memory, contact, felt, dt)
+        found = sense(self._sensed, contact, felt, dt)
         if found == DIVERGED:
             raise self.observer.diverged()
         if found != QUIET or self._slope_unknown:
@@ -284,7 +285,7 @@ class EmbeddingController:
         """See to what has happened: an edge of the present node, or a plan that is due."""
         if self._slope_unknown:
             self._find_first_slope()
-        edge = first_fired(self._tick[0])
+        edge = first_fired(self._tick)
         if edge >= 0:
             self._traverse(self.mode.outgoing_edges[edge])
         self._replan()

@@ -111,8 +111,12 @@ def fired(
 
 
 @compiled
-def first_fired(t: Any) -> int:
-    """Number of the first edge of the mode that the robot fires; -1: none. ``t`` is of ``TICK``."""
+def first_fired(tick: Any) -> int:
+    """Number of the first edge of the mode that the robot fires; -1: none.
+
+    ``tick`` is (1,) of ``TICK``.
+    """
+    t = tick[0]
     g, mode, s = t.guards, t.mode, t.sensed
     for i in range(mode.edges):
         event = mode.event[i]

@@ -116,14 +116,14 @@ _FLOOR = 0.025  # of the weight: it leaves a foot no load to lift off with, and 
 
 
 @compiled
-def sense(
-    tick: Any, data: Any, references: Any, qp: Any, contact: BoolArray, force: Array, dt: float
-) -> int:
+def sense(kept: Any, contact: BoolArray, force: Array, dt: float) -> int:
     """Take in what was measured, and find out whether anything is to be decided.
 
+    ``kept`` is a :class:`.Kept` of ``tick``, ``data``, ``references`` and ``qp``.
     ``contact`` (n,) says whether each contact touches the ground, ``force`` (n, 2) is the ground's
     on each, forward and up [N], or ``NO_FORCE``; ``dt`` is the control period [s].
     """
+    tick, data, references, qp = kept.value
     t, r = tick[0], data[0]
     _expect(t, r)
     update_contacts(t.contacts, contact, force, dt)
@@ -138,7 +138,7 @@ def sense(
     if not read_state(t.sensed, t.feet, r, t.mode):
         return DIVERGED
     stand(tick, data, references, qp)
-    if first_fired(t) >= 0 or t.lateral.leaves:
+    if first_fired(tick) >= 0 or t.lateral.leaves:
         return EVENTFUL
     lands, deviation = t.mode.next_touchdown_leg >= 0, t.sensed.state[2] - references[0].com[2]
     kept = plan_is_due(t.path, lands, deviation, t.path.time, t.time) == KEPT
@@ -427,14 +427,14 @@ def whole_tick() -> None:
     robot, references, tick = load_robot("five-link"), References(), np.zeros(1, TICK)
     robot.update(robot.neutral(), np.zeros(robot.nv))
     qp, tasks = WholeBodyQp(robot), TaskStack((PostureTask(),), robot.nv)
-    memory = references.data, qp.data
-    sense(tick, robot.data, *memory, np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
-    stand(tick, robot.data, *memory)
+    memory = tick, robot.data, references.data, qp.data
+    sense(keep(memory), np.zeros(2, dtype=bool), np.zeros((2, 2)), 1e-3)
+    stand(*memory)
     plan_is_due(tick["path"][0], True, 0.0, 0.0, 0.0)
-    first_fired(tick[0])
+    first_fired(tick)
     curve = np.ones((2, 1, ORDER + 1)), np.ones((1, 7)), np.ones(3)
     rows = tasks.program, tasks.table
-    kept = keep(((tick, robot.data, *memory, robot.arrays), (curve, None), rows, qp.room(1.0)))
+    kept = keep(((*memory, robot.arrays), (curve, None), rows, qp.room(1.0)))
     act(kept, qp.answer_arrays(), 1e-3)
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from template_control import structured
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.checks.ranges import Count
@@ -77,20 +78,23 @@ def _put(row: Array, at: int, values: Array) -> int:
 
 @compiled
 def write_row(
+    kept: Any,
     row: Array,
     numbers: tuple[float, ...],
     state: tuple[Array, Array, Array, Array],
-    robot: tuple[Any, Array, Array],
-    seen: Any,
+    looks: bool,
 ) -> None:
     """Write the row of a tick, of :func:`_columns`; ``numbers`` are the first seven.
 
+    ``kept`` is a :class:`.Kept` of the controller's ``memory``, the robot's ``joint_places`` and
+    ``heading_frame``, and (1,) of ``SNAPSHOT``, which is of this tick, unless it ``looks`` first.
     ``state`` are q, v, torques, and the ground's forces in the world (n, d) [N], of soles (n, 6)
-    with their moments about its origin [N m]; ``robot`` its ``data``, ``joint_places`` and
-    ``heading_frame``; ``seen`` (1,) of ``SNAPSHOT``.
+    with their moments about its origin [N m].
     """
-    (q, v, torque, force), (data, joints, frame) = state, robot
-    r, s, at = data[0], seen[0], 0
+    memory, (joints, frame), seen = kept.value
+    if looks:
+        look(*memory, seen)
+    (q, v, torque, force), r, s, at = state, memory[1][0], seen[0], 0
     x, y, c, sine = frame[0], frame[1], frame[2], frame[3]
     for number in numbers:
         row[at] = number
@@ -158,10 +162,11 @@ def _to_world(frame: Array, point: Array, row: Array, at: int) -> int:
 def record_row() -> None:
     """A row of the record."""
     robot, tick, seen = load_robot("five-link"), np.zeros(1, TICK), np.zeros(1, SNAPSHOT)
-    look(tick, robot.data, References().data, seen)
+    memory, views = (tick, robot.data, References().data), (robot.joint_places, robot.heading_frame)
+    look(*memory, seen)
     row = np.zeros(sum(map(prod, _columns(robot).values())))
     state = robot.neutral(), np.zeros(robot.nv), np.zeros(len(robot.joint_names)), np.zeros((2, 2))
-    write_row(row, (0.0,) * 7, state, (robot.data, robot.joint_places, robot.heading_frame), seen)
+    write_row(structured.keep((memory, views, seen)), row, (0.0,) * 7, state, True)
 
 
 RECORD = (Part(record_row, 2.5),)  # compiled functions of a recorder
@@ -228,7 +233,8 @@ class Recorder:
         self._block, self._full = np.empty((2, _BLOCK, ends[-1]))
         self._rows = 0  # of the block that is full
         self._seen = np.zeros(1, SNAPSHOT)
-        self._robot = robot.data, robot.joint_places, robot.heading_frame
+        views = robot.joint_places, robot.heading_frame
+        self._kept = structured.keep((controller.memory, views, self._seen))
         self._block_start = 0  # tick of the block
         # By the block's first tick: closing it once more, after an interruption, changes nothing.
         self._blocks: dict[int, _Block] = {}
@@ -267,12 +273,13 @@ class Recorder:
         """
         c, (seen_q, seen_v) = self.controller, self.controller.frame.raw_state
         force, torque = np.ascontiguousarray(force, dtype=np.float64), solution.torque
-        look(*c.memory, self._seen)
         known = q is seen_q and v is seen_v
         if not known:
             q, v = (np.ascontiguousarray(values, dtype=np.float64) for values in (q, v))
             known = np.array_equal(q, seen_q) and np.array_equal(v, seen_v)
-        if not known or not c.frame.of_world:
+        known = known and c.frame.of_world
+        if not known:
+            look(*c.memory, self._seen)  # before the model is updated
             self._update_in_world(q, v)
         after = c.time
         now = self._begins if time is None else time
@@ -283,7 +290,7 @@ class Recorder:
         clocks = float(seconds), solution.solve_seconds
         heading = 0.0 if self._floating is None else self._floating.heading + self._floating.facing
         numbers = float(now), float(push), interval, *clocks, float(solution.solved), heading
-        write_row(row, numbers, (q, v, torque, force), self._robot, self._seen)
+        write_row(self._kept, row, numbers, (q, v, torque, force), known)
         self._before = now
         self.ticks += 1
         if self.ticks - self._block_start == _BLOCK:

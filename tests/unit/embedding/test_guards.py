@@ -214,4 +214,4 @@ def test_a_robot_that_is_over_its_foot_has_passed_the_bottom(node, x, vertical, 
     set_guards(tick["guards"], P, GuardOptions())
     tick["path"]["event_times"] = np.inf
     tick["sensed"]["state"] = x, 0.95, 0.7, vertical
-    assert (first_fired(tick[0]) >= 0) == fires
+    assert (first_fired(tick) >= 0) == fires
