@@ -144,19 +144,18 @@ def turned(rotation: Array, x: float, y: float, z: float) -> tuple[float, float,
 
 
 @compiled
-def move_point(points: Any, i: int, place: Array, drift: Array) -> None:
-    """Write where the frame of contact ``i`` is, and its classical acceleration dJ/dt v.
+def move_point(points: Any, i: int) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Where the frame of contact ``i`` is (3), and its classical acceleration dJ/dt v (6).
 
     With the joint's place p and rotation R in the world, its velocity (v, w) and acceleration
     dJ/dt v = (a, b) in its own axes, and the frame's origin r in them:
 
         p + R r,    R (a + b x r) + R w x R (v + w x r),    R b
 
-    ``place`` (3,) and ``drift`` (6,), linear then angular, are overwritten, in the world's axes.
+    Both are in the world's axes, the acceleration linear, then angular.
     """
     origin, rotation, v, a, r = points[0][i], points[1][i], points[2][i], points[3][i], points[4][i]
     x, y, z = turned(rotation, r[0], r[1], r[2])
-    place[0], place[1], place[2] = x + origin[0], y + origin[1], z + origin[2]
     vx, vy, vz = turned(
         rotation,
         v[0] + (v[4] * r[2] - v[5] * r[1]),
@@ -170,9 +169,9 @@ def move_point(points: Any, i: int, place: Array, drift: Array) -> None:
         a[1] + (a[5] * r[0] - a[3] * r[2]),
         a[2] + (a[3] * r[1] - a[4] * r[0]),
     )
-    drift[0], drift[1] = ax + (wy * vz - wz * vy), ay + (wz * vx - wx * vz)
-    drift[2] = az + (wx * vy - wy * vx)
-    drift[3], drift[4], drift[5] = turned(rotation, a[3], a[4], a[5])
+    place = x + origin[0], y + origin[1], z + origin[2]
+    moving = ax + (wy * vz - wz * vy), ay + (wz * vx - wx * vz), az + (wx * vy - wy * vx)
+    return place, (*moving, *turned(rotation, a[3], a[4], a[5]))
 
 
 @compiled
@@ -246,10 +245,9 @@ def gather_planar(kept: Any, q: Array, v: Array) -> bool:
     for k in range(q.shape[0]):
         jcom[0, k], jcom[1, k] = on * com_jacobian[0, k], com_jacobian[2, k]
         jspin[0, k] = on * centroidal[4, k]
-    r, place, drift = s.foot_radius, np.empty(3), np.empty(PATCH)
+    r, moving = s.foot_radius, np.empty(2)
     for i in range(contact.shape[0]):
-        move_point(points, i, place, drift)
-        x, z = place[0], place[2]
+        (x, _, z), drift = move_point(points, i)
         s.contact_position[i, 0], s.contact_position[i, UP] = on * x, z - r
         for k in range(q.shape[0]):
             turn = jacobian[4, k]
@@ -258,7 +256,7 @@ def gather_planar(kept: Any, q: Array, v: Array) -> bool:
             contact[i, 1, k] = (jacobian[2, k] - turn * x) * carries[i, k]
         s.contact_bias[i, 0] = on * (drift[0] - r * drift[4])
         s.contact_bias[i, UP] = drift[2]
-        moving = np.dot(contact[i], v)
+        np.dot(contact[i], v, moving)
         s.contact_velocity[i, 0], s.contact_velocity[i, UP] = moving[0], moving[1]
     _gather_feet(s)
     # The base coordinates' rows of C v are the rates of linear momentum and of the angular
@@ -330,10 +328,9 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
     force[0], force[1] = _level(frame, force[0], force[1])
     for i in range(3):
         st.com_bias[i] = force[i] / st.mass
-    place, drift, patches = np.empty(3), np.empty(PATCH), contact.shape[1] == PATCH
+    patches = contact.shape[1] == PATCH
     for i in range(contact.shape[0]):
-        move_point(points, i, place, drift)
-        px, py, pz = place[0], place[1], place[2]
+        (px, py, pz), drift = move_point(points, i)
         at, speeds = st.contact_position[i], st.contact_velocity[i]
         at[0], at[1] = _level(frame, px - frame[0], py - frame[1])
         at[2] = pz - r
@@ -370,7 +367,7 @@ def gather_floating(kept: Any, q: Array, v: Array) -> bool:
 
 
 @compiled
-def _gather_patch(s: Any, patch: int, drift: Array, frame: Array, points: Any) -> None:
+def _gather_patch(s: Any, patch: int, drift: tuple[float, ...], frame: Array, points: Any) -> None:
     """Write the angular drift of a patch, and its axes."""
     own, axes, bias = points[5][patch], s.contact_axes[patch], s.contact_bias[patch]
     bias[3], bias[4] = _level(frame, drift[3], drift[4])

@@ -58,7 +58,7 @@ def eliminate(
         for j in range(m):
             columns[i, nu + 1 + j] = jacobian[j, i]
     solve_cholesky(factor, nv, columns)
-    uncontacted, jt = columns[:, : nu + 1].copy(), columns[:, nu + 1 :].copy()
+    uncontacted, jt = columns[:, : nu + 1], columns[:, nu + 1 :]
     delassus = np.zeros((m, m))
     multiply_add(jacobian, jt, delassus)
     f_map[:] = 0.0

@@ -111,7 +111,10 @@ def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
 
 
 class Matrices(NamedTuple):
-    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all from the third on."""
+    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all from the third on.
+
+    The last three are of the contacts on the ground, and work space.
+    """
 
     torque_limit: Array  # (nu,) of the model [N m]
     bounds: Array  # (2, nu) least and greatest accelerations of the joints; (2, 0): none [rad/s^2]
@@ -123,35 +126,38 @@ class Matrices(NamedTuple):
     lower: Array  # bounds of the rows times w
     upper: Array
     minimum: Array  # (nu,) the w of least cost without the constraints
+    jacobian: Array  # (forces, nv) maps v to their velocities
+    bias: Array  # (forces,) their accelerations without those of v, and what damps sliding
+    row: Array  # (nu + 1,)
 
 
 @compiled
-def assemble(p: Any, r: Any, arrays: tuple[Any, ...], tasks: Array, m: Matrices) -> int:
+def assemble(qp: Any, data: Any, arrays: tuple[Any, ...], tasks: Array, m: Matrices) -> int:
     """Fill the QP's matrices; ``SINGULAR``, ``BOUNDED``, or ``FREE``.
 
-    ``FREE`` where ``minimum`` keeps all constraints, which are then left in z. ``p`` is of
-    ``QP_DATA``, ``r`` of ``ROBOT_DATA``; ``tasks`` (t, nv + 3) a stack's table.
+    ``FREE`` where ``minimum`` keeps all constraints, which are then left in z. ``qp`` is (1,) of
+    ``QP_DATA``, ``data`` of ``ROBOT_DATA``; ``tasks`` (t, nv + 3) a stack's table.
     """
+    p, r = qp[0], data[0]
     contact, nv, nu = arrays[4], m.a_map.shape[0], m.torque_limit.shape[0]
     contacts, directions = p.contacts, contact.shape[1]
     up = min(directions, UP + 1) - 1
-    jacobian, bias = np.empty((directions * contacts, nv)), np.empty(directions * contacts)
     for i in range(contacts):
         point = p.contact[i]
         for d in range(directions):
             axis = UP if d == up else d
             for k in range(nv):
-                jacobian[i * directions + d, k] = contact[point, d, k]
+                m.jacobian[i * directions + d, k] = contact[point, d, k]
             sliding = p.contact_damping * r.contact_velocity[point, axis]
-            bias[i * directions + d] = r.contact_bias[point, axis] + sliding
-    if not eliminate(arrays[0], arrays[1], jacobian, bias, nv - nu, m.a_map, m.f_map):
+            m.bias[i * directions + d] = r.contact_bias[point, axis] + sliding
+    if not eliminate(arrays[0], arrays[1], m.jacobian, m.bias, nv - nu, m.a_map, m.f_map):
         return SINGULAR
     m.factor[:], m.gradient[:], m.constraint[:] = 0.0, 0.0, 0.0
     for i in range(nu):
         m.factor[i, i] = p.torque_cost
         m.constraint[i, i] = 1.0
         m.lower[i], m.upper[i] = -1.0, 1.0
-    row = np.empty(nu + 1)
+    row = m.row
     _add_tasks(m, tasks, row)
     _add_contacts(p, r.mass * r.gravity, m, directions, row)
     if directions == PATCH:
@@ -340,16 +346,16 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 
 
 @compiled
-def answer(p: Any, m: Matrices, model: Array, found: tuple[Array, Array, Array]) -> None:
+def answer(load: float, m: Matrices, model: Array, found: tuple[Array, Array, Array]) -> None:
     """Write a tick's answer into ``found``: torques, forces of the contacts, accelerations.
 
-    ``model`` are the joint torques (nu,) of the model [N m].
+    ``model`` are the joint torques (nu,) of the model [N m], ``load`` the robot's inertia over its.
     """
     torque, force, acceleration = found
     _affine(m.a_map, model, acceleration)
     _affine(m.f_map, model, force)
     for i in range(torque.shape[0]):
-        torque[i] = p.load * model[i]
+        torque[i] = load * model[i]
 
 
 @compiled
@@ -375,12 +381,11 @@ def solve_free(
     nothing has been assembled yet. ``room`` is from :meth:`.solver.WholeBodyQp.room`, ``found`` as
     for :func:`answer`.
     """
-    p, r = qp[0], data[0]
-    if bounds_needed(p, r):
+    if bounds_needed(qp[0], data[0]):
         return BRAKED
     m, model = room
-    kind = assemble(p, r, arrays, tasks, m)
+    kind = assemble(qp, data, arrays, tasks, m)
     if kind == FREE:
         torques(m, m.minimum, model)
-        answer(p, m, model, found)
+        answer(qp[0].load, m, model, found)
     return kind

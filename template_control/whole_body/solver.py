@@ -187,7 +187,8 @@ class Workspace:
         nu, forces = len(limit), robot.contact_rows * contacts
         rows = nu + problem.rows_per_contact(robot.contact_rows) * contacts + bounded
         maps = (robot.nv, nu + 1), (forces, nu + 1)
-        shapes = ((2, bounded), *maps, (nu, nu), (nu,), (rows, nu), (rows,), (rows,), (nu,))
+        quadratic = (nu, nu), (nu,), (rows, nu), (rows,), (rows,), (nu,)
+        shapes = (2, bounded), *maps, *quadratic, (forces, robot.nv), (forces,), (nu + 1,)
         self.matrices = problem.Matrices(limit, *(np.zeros(shape) for shape in shapes))
         self._proxqp = load_proxqp()
         self._warm: Any = None  # or a QP that has solved the problem of an earlier tick
@@ -335,8 +336,8 @@ class WholeBodyQp:
         self, kind: int, tasks: TaskStack, found: tuple[Array, Array, Array]
     ) -> tuple[float, bool]:
         """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
-        now, robot, braked = self.data[0], self.robot, kind == problem.BRAKED
-        contacts, seconds = int(now["contacts"]), 0.0
+        robot, braked, seconds = self.robot, kind == problem.BRAKED, 0.0
+        contacts = int(self._contacts[0])
         # With bounds, with bounds that let a joint which is too fast stay so, and without.
         slacks = (-np.inf, 0.0, None) if braked else (None,)
         for slack in slacks:
@@ -344,7 +345,7 @@ class WholeBodyQp:
             if slack is not None:
                 bound_joints(robot, self._options, w.matrices.bounds, slack)
             if braked:
-                state = now, robot.data[0], robot.arrays
+                state = self.data, robot.data, robot.arrays
                 kind = problem.assemble(*state, tasks.table, w.matrices)
             best = w.matrices.minimum if kind == problem.FREE else None
             if best is None:
@@ -365,5 +366,5 @@ class WholeBodyQp:
                     "is singular" if kind == problem.SINGULAR else regular,
                 )
             np.clip(self._torque, -self._limit, self._limit, out=self._torque)
-        problem.answer(now, w.matrices, self._torque, found)
+        problem.answer(self._load, w.matrices, self._torque, found)
         return seconds, best is not None
