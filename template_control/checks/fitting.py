@@ -262,9 +262,10 @@ def _mapping(value: Any, hint: Any) -> Any:
         where = "each key "
         try:
             fitted = fitter(key_hint)(key)
-            where = f"{key} is {shown(entry)}, which should be "
+            where = ""
             found[fitted] = fitter(value_hint)(entry)
         except Refused as refused:
+            where = where or f"{key} is {shown(entry)}, which should be "
             raise Refused(f"{words_for(hint)}; {where}{refused}") from None
     same = all(found.get(key) is entry for key, entry in value.items())
     return value if same else found

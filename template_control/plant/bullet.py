@@ -210,25 +210,19 @@ class BulletPlant(EnginePlant):
         Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
-        forces, axes = self._forces, AXES[self.robot.directions]
+        forces, feet, body = self._forces, self._feet, self.body
+        axes, rows = AXES[self.robot.directions], forces.shape[1]
         for contact in self._world.getContactPoints():
-            sign, link = (1.0, contact[3]) if contact[1] == self.body else (-1.0, contact[4])
-            foot = self._feet.get(link)
+            sign, link = (1.0, contact[3]) if contact[1] == body else (-1.0, contact[4])
+            foot = feet.get(link)
             if foot is None:
                 self._trunk_lies = self._trunk_lies or link == self._trunk
                 continue
             # Normal force and direction (a wall pushes sideways), two of friction.
-            normal, along, across = contact[9], contact[10], contact[12]
-            force = [
-                sign
-                * (
-                    normal * contact[7][axis]
-                    + along * contact[11][axis]
-                    + across * contact[13][axis]
-                )
-                for axis in axes
-            ]
-            if forces.shape[1] == PATCH:
+            normal, along, across = sign * contact[9], sign * contact[10], sign * contact[12]
+            up, ahead, left = contact[7], contact[11], contact[13]
+            force = [normal * up[i] + along * ahead[i] + across * left[i] for i in axes]
+            if rows == PATCH:
                 force += moment(contact[6], force)
             for i, part in enumerate(force):
                 forces[foot, i] += part

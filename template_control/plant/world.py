@@ -97,7 +97,7 @@ class EnginePlant(OptionsPlant, ABC):
         divided by that step.
         """
         self._read_contacts()
-        out[:] = self._forces
+        out[...] = self._forces
 
     def trunk_touches_ground(self) -> bool:
         """See :class:`~.plant.Plant`."""
@@ -107,5 +107,5 @@ class EnginePlant(OptionsPlant, ABC):
     def _read_contacts(self) -> None:
         if self._stale:
             self._stale, self._trunk_lies = False, False
-            self._forces[:] = 0.0
+            self._forces.fill(0.0)
             self._find_contacts()

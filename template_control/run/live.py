@@ -187,11 +187,14 @@ class LiveRun:
     def finish(self, progress: Callable[[int], None] | None = None) -> None:
         """Go on to the end; ``progress`` gets the number of completed steps after each."""
         done = 0
-        for tick in self:
-            if tick.steps > done:
-                done = tick.steps
-                if progress is not None:
-                    progress(done)
+        try:
+            for tick in self._ticks:
+                if tick.steps > done:
+                    done = tick.steps
+                    if progress is not None:
+                        progress(done)
+        finally:
+            self.ended = True
 
     def close(self) -> None:
         """End the run, and give back its plant, robot and planners; the record stays."""
@@ -243,6 +246,7 @@ class LiveRun:
         torques: deque[Array] = deque(maxlen=o.delay_ticks + 1)  # until they act
         q, v = robot.neutral(), np.zeros(robot.nv)
         forces = np.zeros((len(robot.feet), robot.contact_rows))
+        linear = forces[:, : robot.directions]  # without the moments of soles
         contacts = ContactSensors(o.sensors, o.falls.contact_force * robot.mass * robot.gravity)
         thrown = o.falls.thrown * controller.parameters.speed_unit
         done, tick, failures = 0, 0, QpFailures(robot.name)
@@ -255,10 +259,9 @@ class LiveRun:
             plant.contact_forces(forces)
             begin = time.perf_counter()
             try:
-                own = np.ascontiguousarray(forces[:, : robot.directions])
-                touching, felt = contacts.measure(own)
+                touching, felt = contacts.measure(np.ascontiguousarray(linear))
                 sensed = senses.measure(q, v, touching)
-                speed = hypot(*sensed[1][: robot.directions].tolist())
+                speed = hypot(*sensed[1].tolist()[: robot.directions])
                 if speed > thrown and recorder.ticks:
                     raise DivergedError(f"the base moves at {speed:.3g} m/s")
                 solution = controller.tick(*sensed, touching, dt, felt)
@@ -286,7 +289,9 @@ class LiveRun:
             yield Tick(tick, now, done, q, v, forces, push=push, solution=solution)
             try:
                 force = plant_force(robot, *push) if along or lateral else ()
-                torques.extend([solution.torque] * (1 if torques else o.delay_ticks + 1))
+                if not torques:
+                    torques.extend([solution.torque] * o.delay_ticks)
+                torques.append(solution.torque)
                 plant.step(torques[0], *force)
             except DivergedError as error:
                 self.reason = f"the simulation diverged at {now:.3f} s: {error}"

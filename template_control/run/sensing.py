@@ -122,7 +122,8 @@ class ContactSensors:
     """
 
     def __init__(self, options: SensorOptions | ImuOptions, threshold: float) -> None:
-        self._errors, self._threshold = options.contact_errors, threshold
+        self._errors = options.contact_errors
+        self._threshold = np.array(threshold)  # NumPy compares arrays sooner than with a number
         self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
 
     def measure(self, forces: Array) -> tuple[BoolArray, Array]:
