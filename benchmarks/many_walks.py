@@ -11,13 +11,14 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Executor
 from statistics import median
 
 import numpy as np
 
 from template_control.run.experiment import Experiment
 from template_control.run.options import Push
+from template_control.sweep.executor import workers
 from template_control.sweep.many import simulate_many
 
 _TURNS, _STEPS, _THIN = 4, 20, 20
@@ -32,7 +33,7 @@ def walks(number: int) -> list[Experiment]:
     ]
 
 
-def seconds(rows: list[Experiment], pool: ProcessPoolExecutor) -> float:
+def seconds(rows: list[Experiment], pool: Executor) -> float:
     """Time that the walks take [s]."""
     begin = time.perf_counter()
     fallen = sum(record.fell for record in simulate_many(rows, pool))
@@ -49,7 +50,7 @@ def main() -> None:
     options = parser.parse_args()
     rows = walks(max(options.walks // _TURNS, 2))
     taken: dict[int, list[float]] = {1: [], 2: []}
-    with ProcessPoolExecutor(1) as one, ProcessPoolExecutor(2) as two:
+    with workers(1) as one, workers(2) as two:
         for pool in (one, two, two):
             simulate_many(rows[:2], pool)
         for _ in range(_TURNS):

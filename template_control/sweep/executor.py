@@ -16,6 +16,8 @@ from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any
 
+from threadpoolctl import threadpool_limits
+
 from template_control.errors import SweepError
 from template_control.storage import to_jsonable
 from template_control.sweep.file import Outcome
@@ -150,7 +152,7 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
     Ctrl-C for one, kills them whatever they are doing.
     """
     others = set(multiprocessing.active_children())
-    pool = _Workers(count, initializer=_obey_parent_only)
+    pool = _Workers(count, initializer=_begin_worker)
     try:
         yield pool
     except BaseException:
@@ -162,8 +164,12 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(cancel_futures=True)
 
 
-def _obey_parent_only() -> None:
-    """Leave Ctrl-C to the parent, and end with it once compiled code returns (in a worker)."""
+def _begin_worker() -> None:
+    """Leave Ctrl-C to the parent, and end with it once compiled code returns (in a worker).
+
+    Linear algebra has one thread. More wait for work in a loop, on the core of another worker.
+    """
+    threadpool_limits(1, user_api="blas")
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     # A command line handles these in the parent; the executor ends its processes with the first.
     for number in (signal.SIGTERM, signal.SIGHUP):
