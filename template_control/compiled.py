@@ -24,12 +24,31 @@ _PACKAGE = Path(__file__).parent
 _IMPORT = re.compile(rb"^(?:from|import) (template_control[\w.]*)", re.MULTILINE)
 _KEPT = 3  # folders: switching between revisions of the sources does not compile again
 
-# No function is called through a C pointer.
-_ALLOCATING: dict[str, Any] = {"no_cfunc_wrapper": True}
+
+class _Flags(set[str]):
+    """Flags whose text is the same in all processes.
+
+    Numba puts it into the names of functions. With a set's own order, which differs from process to
+    process, machine code of two processes would hold a function twice, be inlined otherwise, and
+    round otherwise.
+    """
+
+    def __repr__(self) -> str:
+        return str(sorted(self))
+
+
+# No function is called through a C pointer. The rest is Numba's default; a function that does not
+# say so has the flags of the one for which it happens to be compiled first.
+_ALLOCATING: dict[str, Any] = {
+    "error_model": "python",
+    "fastmath": False,
+    "no_cfunc_wrapper": True,
+    "_nrt": True,
+}
 # Reference counting costs a fifth to a third of a closed-form step.
 _LEAN: dict[str, Any] = {
     "error_model": "numpy",
-    "fastmath": {"contract", "arcp", "nsz"},
+    "fastmath": _Flags({"contract", "arcp", "nsz"}),
     "no_cfunc_wrapper": True,
     "_nrt": False,
 }

@@ -126,3 +126,45 @@ def test_the_digest_covers_what_compiled_code_depends_on_and_no_more(tmp_path, m
 def test_every_compiled_function_of_the_package_goes_through_the_cache():
     texts = {path: path.read_text() for path in PACKAGE.rglob("*.py")}
     assert [p.name for p, text in texts.items() if "njit" in text] == ["compiled.py"]
+
+
+FLAGS = """\
+import numpy
+from template_control.compiled import compiled, inner
+
+@compiled
+def product_sum(a, b, c):
+    return a * b + c
+
+@inner
+def through(a, b, c):
+    return product_sum(a, b, c)
+
+FIRST(1.0, 2.0, 3.0)
+product_sum(1.0, 2.0, 3.0)
+[(signature, code)] = product_sum.overloads.items()
+print("contract" in product_sum.inspect_llvm(signature))
+print([code.fndesc.llvm_func_name for code in through.overloads.values()])
+"""
+
+
+@pytest.mark.slow(seconds=4)
+def test_a_function_has_its_own_flags_whatever_it_is_compiled_for(tmp_path):
+    """Not those of a function that calls it; and its name is the same in all processes."""
+    said = {}
+    for first in ("product_sum", "through"):
+        for seed in ("1", "2"):
+            path = tmp_path / f"{first}_{seed}" / "flags.py"
+            path.parent.mkdir()
+            path.write_text(FLAGS.replace("FIRST", first))
+            more = {"PYTHONHASHSEED": seed, "NUMBA_CACHE_DIR": str(path.parent)}
+            done = subprocess.run(
+                [sys.executable, path],
+                env=os.environ | more | {"PYTHONPATH": str(PACKAGE.parent)},
+                stdout=subprocess.PIPE,
+                text=True,
+                check=True,
+            )
+            said[first, seed] = done.stdout.splitlines()
+    assert {lines[0] for lines in said.values()} == {"False"}
+    assert said["through", "1"][1] == said["through", "2"][1] != "[]"

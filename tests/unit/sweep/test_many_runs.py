@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info
 
 import template_control as tc
 from template_control.errors import ParameterError, RobotError
@@ -34,3 +35,14 @@ def test_an_experiment_with_what_only_this_process_has_is_refused():
 def test_a_robot_that_does_not_exist_is_reported_as_by_simulate():
     with pytest.raises(RobotError, match="there is no robot 'nobody'"):
         tc.simulate_many([tc.Experiment("nobody", steps=1)])
+
+
+def blas_threads():
+    return [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+
+
+def test_a_worker_has_one_thread_of_linear_algebra():
+    """Others would wait for work in a loop, on the core of another worker."""
+    np.linalg.norm(np.ones(2))
+    with workers(1) as pool:
+        assert set(pool.submit(blas_threads).result()) == {1}
