@@ -125,6 +125,15 @@ def compiled(function: Function) -> Any:
     return _cached(function, _ALLOCATING)
 
 
+def compiled_into(function: Function) -> Any:
+    """As :func:`compiled`, of long functions that become part of those that call them.
+
+    Numba optimises a function alone, and again in each function that calls it; these are not
+    compiled alone, unless Python calls them.
+    """
+    return _cached(function, {**_ALLOCATING, "inline": "always"})
+
+
 def inner(function: Function) -> Any:
     """Decorator of compiled functions that allocate nothing: the template's kernels."""
     return _cached(function, _LEAN)

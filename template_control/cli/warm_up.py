@@ -6,17 +6,14 @@ import argparse
 
 import numpy as np
 
-from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.planners.modified import ModifiedPlanner
-from template_control.embedding.tick import CONTROL
-from template_control.estimation.delay import DELAY
 from template_control.plant.bullet import READ
 from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.robot.spec import RobotSpec
 from template_control.robot.template import paper_gait, template_for
 from template_control.run.experiment import Experiment
-from template_control.run.recorder import RECORD
+from template_control.run.live import COMPILED
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.control.controllers import ModifiedWalking
@@ -27,7 +24,6 @@ from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.planning.look_ahead import AHEAD
-from template_control.slip.planning.pressure import PRESSURE
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import example_one
 from template_control.terminal import plain_console
@@ -47,10 +43,10 @@ def run(options: argparse.Namespace) -> int:
     # Not above: what a module with that import imports is taken for part of the compiled code.
     from template_control.compiled import cache_folder
 
-    ready((*CONTROL, *RECORD, *DELAY, *WALK))
+    ready(COMPILED)
     # These call the first ones; not each other, but for the floating base.
     others = (Part(scenarios, 1.0), Part(basins, 1.2), Part(ideal_plant, 1.8))
-    ready((*READ, *LATERAL, Part(floating_base, 26.0), *AHEAD, *PRESSURE, *others))
+    ready((*READ, *LATERAL, Part(floating_base, 26.0), *AHEAD, *others))
     plain_console().print(f"everything is compiled, in {cache_folder()}", soft_wrap=True)
     return 0
 

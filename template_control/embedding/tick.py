@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array, BoolArray
-from template_control.compiled import compiled
+from template_control.compiled import compiled, compiled_into
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
@@ -193,7 +193,7 @@ def feel_friction(tick: Any, data: Any, qp: Any, force: Array, dt: float) -> Non
         qp[0].friction = t.friction_margin * t.slides.coefficient
 
 
-@compiled
+@compiled_into
 def advance(kept: Any, dt: float) -> None:
     """Move the references on, write the tasks' rows and the stance, for ``dt`` [s].
 
@@ -225,7 +225,7 @@ def advance(kept: Any, dt: float) -> None:
     t.time += dt
 
 
-@compiled
+@compiled_into
 def solve(kept: Any, found: tuple[Array, Array, Array]) -> int:
     """Solve the QP of the rows as they are, as :func:`.solve_free` returns it."""
     (_, data, _, qp, arrays), _, (_, table), room = kept.value
@@ -438,5 +438,5 @@ def whole_tick() -> None:
     act(kept, qp.answer_arrays(), 1e-3)
 
 
-CONTROL = (Part(whole_tick, 18.0),)
+CONTROL = (Part(whole_tick, 14.5),)
 """Compiled functions of a tick."""

@@ -69,7 +69,7 @@ def learnt_delay() -> None:
     add_errors(np.zeros(9), np.zeros((65, 7)), np.zeros((73, 7)), 3, (1e-3, 60.0))
 
 
-DELAY = (Part(learnt_delay, 0.7),)  # compiled functions of the delay's estimate
+DELAY = (Part(learnt_delay, 0.1),)  # compiled functions of the delay's estimate
 
 
 class DelayCompensation:

@@ -19,7 +19,6 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
-from template_control.embedding.planners.lqr import WALK
 from template_control.embedding.state import SectionReport
 from template_control.embedding.tick import CONTROL
 from template_control.errors import DivergedError, ParameterError
@@ -39,8 +38,11 @@ from template_control.run.start import start
 from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
+from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning.pressure import PRESSURE
+from template_control.slip.planning.step_search import SEARCH
 from template_control.slip.scenario.route import Route, SteadyRoute
 from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution
@@ -72,7 +74,8 @@ _LOG = logging.getLogger(__name__)
 QP_FAILURES = logging.getLogger(f"{__name__}.failures")
 """Logger of the warning that the QP has no solution in many ticks."""
 
-COMPILED = (*WALK, *CONTROL, *RECORD, *DELAY)  # compiled functions of a walk and its record
+COMPILED = (*STRIDES, *SEARCH, *CONTROL, *RECORD, *DELAY, *PRESSURE)
+"""Compiled functions of a walk and its record; of two processes one compiles the first two."""
 
 _OTHER_TEMPLATE = 0.05
 """Share by which a template may differ from the robot's own: a choice of l0, not another robot."""

@@ -169,7 +169,7 @@ def record_row() -> None:
     write_row(structured.keep((memory, views, seen)), row, (0.0,) * 7, state, True)
 
 
-RECORD = (Part(record_row, 2.5),)  # compiled functions of a recorder
+RECORD = (Part(record_row, 2.0),)  # compiled functions of a recorder
 
 
 class _Block(NamedTuple):

@@ -28,7 +28,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.cholesky import cholesky
-from template_control.compiled import compiled
+from template_control.compiled import compiled, compiled_into
 from template_control.robot.terms import MOST_CONTACTS, PATCH, UP
 from template_control.whole_body.elimination import eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
@@ -366,7 +366,7 @@ def bounds_needed(p: Any, r: Any) -> bool:
     return r.fastest > p.speed_share or r.soonest_stop <= p.stop_time
 
 
-@compiled
+@compiled_into
 def solve_free(
     qp: Any,
     data: Any,

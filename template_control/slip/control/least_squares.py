@@ -12,7 +12,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.cholesky import cholesky, solve_cholesky
-from template_control.compiled import compiled
+from template_control.compiled import compiled, compiled_into
 
 _NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
 _LESS = 0.1  # of the damping, after a step that does as foreseen; after a bad one as much more
@@ -139,7 +139,7 @@ def _copy(source: _Point, target: _Point) -> None:
             target.rows[r, i] = source.rows[r, i]
 
 
-@compiled
+@compiled_into
 def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
     """The least cost on a grid within the bounds, its place in ``best``; inf where all fails."""
     size, least = best.x.shape[0], np.inf

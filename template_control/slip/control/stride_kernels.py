@@ -31,5 +31,5 @@ def strides() -> None:
     solve_stride(whole(step, _STATE), _STATE, prior, np.eye(3))
 
 
-STRIDES = (Part(strides, 27.0),)
+STRIDES = (Part(strides, 21.3),)
 """Compiled functions of strides."""

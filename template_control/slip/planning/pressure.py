@@ -337,5 +337,5 @@ def plans() -> None:
     polynomial(one, 1.0)
 
 
-PRESSURE = (Part(plans, 6.5),)
+PRESSURE = (Part(plans, 5.3),)
 """Compiled functions of a plan of the centre of pressure."""

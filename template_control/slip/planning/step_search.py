@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled
+from template_control.compiled import compiled, compiled_into
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
 from template_control.slip.control.least_squares import copy
 from template_control.slip.control.touchdown import steepest
@@ -204,7 +204,7 @@ def _fine(centre: Array, widths: tuple[float, float], i: int, u: Array) -> None:
         u[1 + place // 2 * 2] += (2 * (place % 2) - 1) * widths[1]
 
 
-@compiled
+@compiled_into
 def search(law: Law, s: Scratch, z: Array, best: Array, first: Array) -> float:
     """Improve ``best`` (c,) in place: a coarse grid over all bounds, then finer ones about it.
 
@@ -292,5 +292,5 @@ def chosen_step() -> None:
     choose(law, new_scratch(), three, np.ones(3), np.empty(3))
 
 
-SEARCH = (Part(chosen_step, 6.3),)
+SEARCH = (Part(chosen_step, 4.3),)
 """Compiled functions of the look-ahead, in addition to those of strides."""
