@@ -40,7 +40,10 @@ def test_a_floating_base_walks_runs_and_walks_again():
     hopping = (record.section_time > 8.5) & (record.section_time < 10.0)
     np.testing.assert_allclose(record.section_state[hopping, 0], -0.24, atol=0.05)
     assert not record.facing.any()
-    assert record.section_state[-1, 0] == pytest.approx(0.6, rel=0.1)
+    last = record.time > record.time[-1] - 1.0
+    way = np.ptp(record.space_com[last, :2], axis=0)
+    # The speed that is asked for is the mean one; at VLO a walk is slower.
+    assert np.hypot(*way) / np.ptp(record.time[last]) == pytest.approx(0.6, rel=0.1)
 
 
 @pytest.mark.slow(seconds=6)

@@ -140,6 +140,6 @@ def test_after_a_warm_up_no_command_compiles(tmp_path, monkeypatch):
     }
     assert {"choose", "section_jacobian", "one_stride", "map_many"} <= called  # of planners, maps
     assert {"least_squares", "modified_step", "record_stride"} <= called  # of scenarios
-    assert {"keep", "gather_planar", "gather_floating"} <= called  # of ticks
+    assert {"_keep", "gather_planar", "gather_floating"} <= called  # of ticks
     for line, code in commands.items():
         assert code <= warm, line
