@@ -123,7 +123,8 @@ class ContactSensors:
 
     def __init__(self, options: SensorOptions | ImuOptions, threshold: float) -> None:
         self._errors = options.contact_errors
-        self._threshold = np.array(threshold)  # NumPy compares arrays sooner than with a number
+        # Two arrays are compared faster than an array and a number.
+        self._threshold = np.array(threshold)
         self._draws = np.random.default_rng((options.seed, _CONTACT_DRAWS))
 
     def measure(self, forces: Array) -> tuple[BoolArray, Array]:
