@@ -29,7 +29,7 @@ from rich.console import Console
 from rich.table import Table
 
 import template_control as tc
-from template_control.embedding.free.options import FREE_PLANNER
+from template_control.embedding.options import FREE_PLANNER
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.planner import Planner
 from template_control.embedding.planners.running import RunningPlanner

@@ -60,3 +60,4 @@ from .view.figures import save_figures as save_figures
 from .view.replay.replay import replay as replay
 from .view.replay.replay import save_film as save_film
 from .view.replay.replay import save_html as save_html
+from .whole_body.solver import QpOptions as QpOptions

@@ -22,6 +22,7 @@ DEPRECATED = {
     "template_control.embedding.Free": "template_control.embedding:RestContext",
     "template_control.embedding.FreeController": "template_control.embedding:EmbeddingController",
     "template_control.embedding.FreeControls": "template_control.embedding:RestContext",
+    "template_control.embedding.FreeOptions": "template_control.embedding:EmbeddingOptions",
     "template_control.embedding.FrictionOptions": "template_control.estimation:FrictionOptions",
     "template_control.embedding.gaits_by_speed": "template_control.slip:gaits_by_speed",
     "template_control.embedding.LandingPlanner": "template_control.embedding:Planner",

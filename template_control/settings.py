@@ -1,10 +1,12 @@
 """Options as TOML: nested dataclasses to tables and back.
 
 A dataclass is a table, its fields are the keys. A tuple is a list, an enumeration's member is its
-name in lower case, a field that is None is left out. Where a field may hold one of several
-dataclasses, the key ``kind`` says which by the class attribute of that name. Keys that a field had
-before are in the class attribute ``old_keys``. What TOML cannot say, such as a table of tasks, is
-given in Python only.
+name in lower case, a field that is None is left out, or is "none" where that is not its default.
+Where a field may hold one of several dataclasses, the key ``kind`` says which by the class
+attribute of that name. A class with presets has them by the value of its field ``kind`` in the
+class method ``of_kind``: its table has the keys that differ. Keys that a field had before are in
+the class attribute ``old_keys``. What TOML cannot say, such as a table of tasks, is given in Python
+only.
 """
 
 from __future__ import annotations
@@ -12,13 +14,14 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from datetime import date, time
 from enum import Enum
 from functools import cache
 from inspect import getdoc
 from pathlib import Path
-from types import NoneType, UnionType
+from types import MappingProxyType, NoneType, UnionType
 from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -34,6 +37,8 @@ T = TypeVar("T")
 
 _OF_TOML = (bool, int, float, str, list, dict, date, time)
 _KIND = "kind"
+_PRESETS = "of_kind"
+_NONE = "none"
 PYTHON_ONLY = {"python_only": True}  # metadata of a field that a file leaves out
 
 _NUMBERS = re.compile(r"""\[\n((?:\ +[^\s"'\[\]{},]+,\n)+)\ *\]""")
@@ -65,8 +70,8 @@ def read(kind: type[T], path: str | Path) -> T:
 class _Keys(dict[str, Any]):
     """Table of the keys to set in ``base``, a dataclass that has the others already."""
 
-    def __init__(self, base: Any) -> None:
-        super().__init__()
+    def __init__(self, base: Any, keys: Mapping[str, Any] = MappingProxyType({})) -> None:
+        super().__init__(keys)
         self.base = base
 
 
@@ -77,20 +82,21 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
     base = table.base if isinstance(table, _Keys) else None
     known = {f.name: f for f in fields(kind) if f.init}  # type: ignore[arg-type]
     hints = _hints(kind)
-    old_keys: Mapping[str, str] = getattr(kind, "old_keys", {})
+    preset = None
+    if hasattr(kind, _PRESETS):
+        preset = base = _preset(kind, base, table, where)
     values: dict[str, Any] = {}
-    for key, value in table.items():
-        if key == _KIND and hasattr(kind, _KIND):
+    for name, (place, value) in _by_name(kind, table, where).items():
+        if name == _KIND and name not in known and hasattr(kind, _KIND):
             continue
-        place = f"{where}.{key}" if where else key
-        name = old_keys.get(key, key)
         if name not in known:
             raise _unknown(place, name, known)
-        if name in values:
-            raise ParameterError(f"{place} is given by two keys: give {name} only")
-        usual = _usual_kind(known[name])
-        if isinstance(value, dict) and not isinstance(value, _Keys) and usual is not None:
-            value = {_KIND: usual, **value}
+        if isinstance(value, dict) and not isinstance(value, _Keys):
+            usual = _usual_kind(known[name])
+            if is_dataclass(getattr(preset, name, None)):
+                value = _Keys(getattr(preset, name), value)
+            elif usual is not None:
+                value = {_KIND: usual, **value}
         values[name] = _read(hints[name], value, place)
     if type(base) is kind:
         return _made(lambda: replace(base, **values), kind, where)  # type: ignore[type-var]
@@ -101,6 +107,39 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         if name not in values and f.default is MISSING and f.default_factory is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
     return _made(lambda: kind(**values), kind, where)
+
+
+def _preset(kind: Any, base: Any, table: Mapping[str, Any], where: str) -> Any:
+    """Preset of a table's ``kind``, with what ``base`` has otherwise than its own preset."""
+    place = f"{where}.{_KIND}" if where else _KIND
+    wanted = table.get(_KIND, getattr(base or kind, _KIND))
+    found = kind.of_kind(_read(_hints(kind)[_KIND], wanted, place))
+    if base is None:
+        return found
+    usual = kind.of_kind(base.kind)
+    names = [f.name for f in fields(base) if f.name != _KIND]
+    own = {name: getattr(base, name) for name in names}
+    return replace(found, **{k: v for k, v in own.items() if v != getattr(usual, k)})
+
+
+def _by_name(kind: Any, table: Mapping[str, Any], where: str) -> dict[str, tuple[str, Any]]:
+    """A table's values by the fields' names of today, each with its key for messages."""
+    old_keys: Mapping[str, str] = getattr(kind, "old_keys", {})
+    now = {key: old_keys.get(key, key) for key in table}
+    found: dict[str, tuple[str, Any]] = {}
+    for key in sorted(table, key=lambda key: now[key].count(".")):
+        name, _, inner = now[key].partition(".")
+        place = f"{where}.{key}" if where else key
+        if not inner and name not in found:
+            found[name] = place, table[key]
+            continue
+        # Of an inner table by now.
+        held = copy(found[name][1]) if name in found else _opened(table, name, place)
+        if not inner or inner in held:
+            raise ParameterError(f"{place} is given by two keys: give {now[key]} only")
+        held[inner] = table[key]
+        found[name] = place.removesuffix(key) + name, held
+    return found
 
 
 def _unknown(place: str, name: str, known: Iterable[str]) -> ParameterError:
@@ -168,6 +207,8 @@ def _read(hint: Any, value: Any, where: str) -> Any:
         if wanted in (None, own) or not kinds:
             return from_table(type(value.base), value, where)
     if origin in (Union, UnionType):
+        if value == _NONE and NoneType in arguments and str not in arguments:
+            return None
         return _read_one_of([a for a in arguments if a is not NoneType], value, where)
     if is_dataclass(hint):
         return from_table(hint, value, where)  # type: ignore[arg-type]
@@ -200,8 +241,12 @@ def _read(hint: Any, value: Any, where: str) -> Any:
 
 
 def _kinds(hints: Sequence[Any]) -> dict[str, Any]:
-    """The dataclasses of a union that have a ``kind``, by it."""
-    return {getattr(h, _KIND): h for h in hints if is_dataclass(h) and hasattr(h, _KIND)}
+    """The dataclasses of a union that have a ``kind`` each, by it."""
+    return {
+        getattr(h, _KIND): h
+        for h in hints
+        if is_dataclass(h) and hasattr(h, _KIND) and not hasattr(h, _PRESETS)
+    }
 
 
 def _read_one_of(hints: list[Any], value: Any, where: str) -> Any:
@@ -308,11 +353,15 @@ def _said(hint: Any) -> bool:
 def to_table(options: Any, where: str = "") -> dict[str, Any]:
     """A dataclass as a table; a ParameterError names a value that TOML cannot hold."""
     table: dict[str, Any] = {_KIND: options.kind} if hasattr(options, _KIND) else {}
-    hints = _hints(type(options))
+    kind: Any = type(options)
+    hints = _hints(kind)
+    preset = kind.of_kind(options.kind) if hasattr(kind, _PRESETS) else None
     for f in fields(options):
         value = getattr(options, f.name)
         place = f"{where}.{f.name}" if where else f.name
         if value is None:
+            if getattr(preset, f.name, None) is not None:
+                table[f.name] = _NONE
             continue
         try:
             if not _fits(hints[f.name], value) or f.metadata.keys() >= PYTHON_ONLY.keys():

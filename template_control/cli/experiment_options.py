@@ -14,6 +14,7 @@ from typing import Any
 
 from template_control.checks import option_types as values
 from template_control.cli.flags import ALL, GAIT, LEAVES, OWN_URDF, PLANNERS, STANDS, Flag
+from template_control.embedding.options import KINDS
 from template_control.embedding.planners.ahead import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.embedding.planners.modified import ModifiedOptions
@@ -138,5 +139,5 @@ def _planner(name: str, base: Experiment) -> Any:
         return OwnPlanner(name)
     if getattr(base.planner, "kind", None) == name:
         return base.planner
-    own = base.tuning.planning
+    own = KINDS[base.tuning.kind]
     return {LqrOptions.kind: own.lqr, AheadOptions.kind: own.ahead}.get(name) or PLANNERS[name]()

@@ -255,7 +255,7 @@ WORLD = (
     ),
     Flag(
         "--friction",
-        "controller.friction world.friction",
+        "controller.qp.friction world.friction",
         "Coulomb friction between feet and ground, 0.7 if not given",
         number(Range(0.05, 5.0)),
     ),
@@ -269,7 +269,7 @@ WORLD = (
         read=terrain_from,
     ),
     Flag("--mass-scale", "world.mass_scale", type=number(Range(0.5, 2.0))),
-    Flag("--torque-scale", "controller.torque_scale", type=number(Range(0.01, 10.0))),
+    Flag("--torque-scale", "controller.qp.torque_scale", type=number(Range(0.01, 10.0))),
 )
 
 

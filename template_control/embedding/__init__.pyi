@@ -1,10 +1,9 @@
 from .controller import EmbeddingController as EmbeddingController
-from .free.options import FREE_PHASES as FREE_PHASES
-from .free.options import FREE_PLANNER as FREE_PLANNER
-from .free.options import FreeOptions as FreeOptions
+from .free.phases import FREE_PHASES as FREE_PHASES
 from .lean import Lean as Lean
 from .lean import LeanOptions as LeanOptions
 from .modes import GuardOptions as GuardOptions
+from .options import FREE_PLANNER as FREE_PLANNER
 from .options import EmbeddingOptions as EmbeddingOptions
 from .phases import PHASES as PHASES
 from .phases import Clock as Clock

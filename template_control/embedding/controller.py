@@ -17,11 +17,10 @@ import numpy as np
 from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
 from template_control.embedding.free.motion import Course, LateralMotion
-from template_control.embedding.free.options import FreeOptions, default_options
 from template_control.embedding.ground import SlopeFrame
 from template_control.embedding.learners import Learners
 from template_control.embedding.modes import PLACED, check_legs, first_fired, modes, set_guards
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.options import EmbeddingOptions, robot_kind
 from template_control.embedding.planners.planner import Cause, Planner, Planners
 from template_control.embedding.recovery import NEEDED, Recovery
 from template_control.embedding.state import SectionReport, Snapshot, StateObserver
@@ -110,18 +109,20 @@ class EmbeddingController:
         if route is None:
             raise ParameterError("several planners and no route: say which stride comes next")
         scale = Scale.of(route.parameters)
-        given = options or default_options(robot)
+        kind = robot_kind(robot)
+        given = options or EmbeddingOptions.of_kind(kind)
         floats = isinstance(robot, FloatingBaseBiped)
-        if floats is not isinstance(given, FreeOptions):
+        if floats is (given.lateral is None):
             base = "has a floating base" if floats else "is held in its plane"
             raise ParameterError(
-                f"{robot.name} {base}, and its embedding has {type(given).__name__}: give"
-                f" {'Free' if floats else 'Embedding'}Options"
+                f"{robot.name} {base}, and its embedding has options of kind {given.kind!r}"
+                f" {'with' if given.lateral else 'without'} lateral ones: give"
+                f" EmbeddingOptions.of_kind({kind!r})"
             )
         o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
         self._tick = tick = np.zeros(1, TICK)
-        tick["friction_margin"] = o.friction_margin
+        tick["friction_margin"] = o.qp.friction_margin
         self.learners = Learners(o, self.parameters, robot, tick)
         self.slope = SlopeEstimate(self.parameters.rest_length)
         self.frame = SlopeFrame(robot, tick["frame"])
@@ -134,7 +135,7 @@ class EmbeddingController:
         self.observer = StateObserver(robot, self.feet, wanted, tick["sensed"], tick["mode"])
         set_guards(tick["guards"], self.parameters, o.guards)
         check_legs(automaton, robot)
-        self._modes = modes(automaton, robot.nv, o.phases)
+        self._modes = modes(automaton, robot.nv, o.phase_table())
         for mode in self._modes.values():
             mode.tasks.check(robot)
         curved = {name for name, mode in self._modes.items() if mode.control.follow_curve}
@@ -145,13 +146,13 @@ class EmbeddingController:
         tick["path"]["body"][0, 5] = robot.half_length
         self._enter(next(iter(self._modes)))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
-        self.qp = WholeBodyQp(robot, o)
+        self.qp = WholeBodyQp(robot, o.qp)
         self.course: Callable[[float], Course] = lambda time: Course()
         self.courses: list[Course] = []
         self.lateral: LateralMotion | None = None
-        if isinstance(robot, FloatingBaseBiped) and isinstance(given, FreeOptions):
+        if isinstance(robot, FloatingBaseBiped) and given.lateral is not None:
             keeps = self.feet, self.references, tick["lateral"]
-            self.lateral = LateralMotion(robot, self.parameters, given, *keeps)
+            self.lateral = LateralMotion(robot, self.parameters, given.lateral, *keeps)
         self.memory = tick, robot.data, self.references.data
         self._memory = *self.memory, self.qp.data
         self._sensed = keep(self._memory)

@@ -144,7 +144,7 @@ class Learners:
         self.load = LoadEstimate(robot.gravity, tick["load"])
         self.trim = MomentumTrim(parameters)
         self.lean = TrunkLean(options.lean, options.trunk_pitch, scale, tick["lean"])
-        set_friction(tick["slides"], options.slides, options.friction, weight, scale)
+        set_friction(tick["slides"], options.slides, options.qp.friction, weight, scale)
 
     @property
     def state(self) -> EstimatorState:

@@ -34,6 +34,7 @@ from template_control.sweep.executor import workers
 from template_control.terminal import counted
 from template_control.view.figures import stick_diagram
 from template_control.view.style import COM, LEFT, RIGHT, TEMPLATE, TRUNK, Look, panelled, shade
+from template_control.whole_body.solver import QpOptions
 
 _COLORS = (TEMPLATE, RIGHT, LEFT, COM)
 
@@ -165,7 +166,7 @@ PLANNERS: dict[str, Callable[[WalkingGait], Planner]] = {
 }
 ALONE, FULL_GRIP = "template alone", "ideal, full grip"
 PLANTS: dict[str, tuple[PlantOptions | IdealOptions, EmbeddingOptions]] = {
-    FULL_GRIP: (IdealOptions(), EmbeddingOptions(friction=GRIP, friction_margin=1.0)),
+    FULL_GRIP: (IdealOptions(), EmbeddingOptions(qp=QpOptions(friction=GRIP, friction_margin=1.0))),
     "ideal": (IdealOptions(), EmbeddingOptions()),
     "PyBullet": (PlantOptions(), EmbeddingOptions()),
 }
@@ -310,7 +311,7 @@ def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Repr
             "Template alone is the exact SLIP: its error is the planner's map. On the ideal plant"
             " (rigid contacts that stick) the error of a robot that is no SLIP is added, in"
             " PyBullet that of its contacts.",
-            f"Full grip: the controller's friction cone ({EmbeddingOptions().cone:g} otherwise)"
+            f"Full grip: the controller's friction cone ({QpOptions().cone:g} otherwise)"
             f" never binds; asked of the {first} only. It makes no difference to speak of: where"
             " the template is light on its foot near VLO, the swing foot gives way and not the"
             " CoM's height.",

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from template_control import settings
 from template_control.arrays import Array
 from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
@@ -220,7 +221,9 @@ DISTURBANCES: tuple[Disturbance, ...] = (
     _lasting("lighter", "lighter", Unit("%", -100.0), _ladder(-0.1, 9), _other_mass),
     _lasting(
         "torque", "torque limits", _PER_CENT, _ladder(-0.05, 19, 1.0),
-        lambda where, level, _: {"controller": replace(where.tuning, torque_scale=level)},
+        lambda where, level, _: {
+            "controller": settings.changed(where.tuning, {"qp.torque_scale": level})
+        },
     ),
     _lasting(
         "noise", "sensor noise", Unit("mrad", 1e3), _ladder(5e-4, 20),

@@ -16,8 +16,13 @@ from template_control import settings, storage
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative, Positive
 from template_control.embedding.free.motion import Course
-from template_control.embedding.free.options import AnyOptions, default_options, options_of_kind
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.options import (
+    KINDS,
+    EmbeddingOptions,
+    RobotKind,
+    kind_of,
+    robot_kind,
+)
 from template_control.embedding.planners.ahead import (
     AheadOptions,
     AheadPlanner,
@@ -86,8 +91,7 @@ class Experiment(Checked):
             where a planar robot has a scenario that walks only, deadbeat for a run, else lqr, tuned
             for the kind of robot; for a route
             :func:`~template_control.embedding.planners.default.default_planners`.
-        controller: tuning of the embedding, FreeOptions of a floating-base robot; None: its kind's
-            default.
+        controller: tuning of the embedding; None: that of the robot's kind.
         world: options of a plant, or a plant of one's own: the run resets it, and leaves it open.
         pushes: on the trunk.
         frictions: times from the run's start, rising [s], and the friction of the ground from each
@@ -119,7 +123,7 @@ class Experiment(Checked):
     robot: RobotSpec | Biped | str = field(default_factory=RobotSpec)
     motion: GaitSpec | Scenario | VelocityProfile | VelocityCommand | Gait | Route | None = None
     planner: PlannerSpec | Planner | Planners | None = None
-    controller: AnyOptions | None = None
+    controller: EmbeddingOptions | None = None
     world: PlantOptions | MujocoOptions | IdealOptions | Plant = field(
         default_factory=default_plant
     )
@@ -172,15 +176,16 @@ class Experiment(Checked):
     @property
     def tuning(self) -> EmbeddingOptions:
         """The controller's, the given one or its kind's default."""
-        return self.controller or self._kind()
+        return self.controller or EmbeddingOptions.of_kind(self.robot_kind)
 
-    def _kind(self) -> EmbeddingOptions:
-        """Options of the robot's kind."""
+    @property
+    def robot_kind(self) -> RobotKind:
+        """Kind of the robot."""
         robot = self.robot
         if isinstance(robot, RobotSpec):
-            return options_of_kind(free=robot.free, flat=robot.stands_flat, trots=robot.trots)
+            return kind_of(free=robot.free, flat=robot.stands_flat, trots=robot.trots)
         assert isinstance(robot, Biped)
-        return default_options(robot)
+        return robot_kind(robot)
 
     @property
     def delay_ticks(self) -> int:
@@ -200,7 +205,7 @@ class Experiment(Checked):
         runs = motion.name == "run" if isinstance(motion, GaitSpec) else None
         if runs or isinstance(motion, RunningGait):
             return RunningOptions()
-        kind = self._kind().planning
+        kind = KINDS[self.robot_kind]
         ahead = False
         if isinstance(motion, Scenario):
             ahead = motion.has_any_speed(kind.bears) and (kind.bears or not self.free)
@@ -225,7 +230,7 @@ class Experiment(Checked):
             if base.motion is None:
                 base = replace(base, motion=base.resolved().motion)
             base = settings.changed(base, first)
-            if type(base.controller) is not type(base._kind()):
+            if base.tuning.kind != base.robot_kind:
                 base = replace(base, controller=None)  # the other kind of robot's
         rest = {k: v for k, v in keys.items() if k not in first}
         own = "world.robot" not in rest and any(k.startswith("world.robot.") for k in rest)
@@ -255,7 +260,7 @@ class Experiment(Checked):
         if isinstance(motion, VelocityProfile | VelocityCommand):
             velocity, motion = velocity_route(robot, motion, e.course)
         if isinstance(motion, GaitSpec):
-            scale = e.tuning.torque_scale
+            scale = e.tuning.qp.torque_scale
             if motion.apex_height is not None:
                 check_apex(robot, motion.run_speed(robot), motion.apex_height, scale)
             gait = motion.of(robot, scale)
@@ -304,7 +309,7 @@ class Experiment(Checked):
             isinstance(motion, ScenarioRoute) and motion.pushes_off
         )
         if planner is None and any_speed:
-            planner = self.tuning.planning.ahead
+            planner = KINDS[self.tuning.kind].ahead
         if isinstance(planner, Mapping):
             return motion, planner
         if isinstance(planner, AheadOptions):

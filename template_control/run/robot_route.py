@@ -8,7 +8,7 @@ import numpy as np
 
 from template_control.checks.checked import checked
 from template_control.checks.fitting import inward
-from template_control.embedding.free.options import SOLE_STAND
+from template_control.embedding.free.motion import SOLE_STAND
 from template_control.embedding.planners.ahead import AheadPlanner
 from template_control.embedding.planners.planner import Context
 from template_control.embedding.planners.running import AGILE

@@ -11,7 +11,6 @@ from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import Index, NotNegative, Share
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.options import FreeOptions
 from template_control.errors import ParameterError
 from template_control.estimation.delay import DelayCompensation
 from template_control.estimation.filters import NoiseFilter
@@ -168,7 +167,6 @@ def senses_of(
     sensors = Sensors(options, robot, template)
     if isinstance(robot, PlanarBiped):
         return ForeseeingSensors(sensors, DelayCompensation(tuning.delay, robot, dt))
-    assert isinstance(tuning, FreeOptions)
     if sensors.exact or tuning.noise_filter is None:
         return sensors
     noise_filter = NoiseFilter(robot, np.array(sensors.deviations), tuning.noise_filter)

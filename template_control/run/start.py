@@ -38,7 +38,7 @@ def _apex_start(
     controller: EmbeddingController, z: Array, planner: Planner, node: Node
 ) -> ApexStart:
     """An apex ``z`` (2 or 3,), in which the route's first gait has its feet."""
-    swing = phase_control(controller.options.phases, node).swing or controller.swings.other
+    swing = phase_control(controller.options.phase_table(), node).swing or controller.swings.other
     pitch, automaton = controller.first_pitch(), controller.supervisor.automaton
     return ApexStart(z[: APEX.dimension], planner.gait, swing, pitch, automaton)
 

@@ -29,7 +29,7 @@ class Study(Checked):
         about: the question.
         experiment: what all trials have, a table as of an experiment's TOML file.
         grid: values by keys; all combinations are tried. Keys with a space between them get the
-            same value, as in ``"world.friction controller.friction"``.
+            same value, as in ``"world.friction controller.qp.friction"``.
         sample: least and largest value by keys, drawn ``draws`` times with ``seed``.
         draws: number of trials of a sample.
         seed: of its draws.

@@ -22,7 +22,7 @@ from template_control.slip.lateral.path import lateral_path
 
 def _weak(scale):
     """A walk whose motors are much too weak."""
-    controller = tc.EmbeddingOptions(torque_scale=scale)
+    controller = tc.EmbeddingOptions(qp=tc.QpOptions(torque_scale=scale))
     return tc.Experiment(steps=10, controller=controller, world=tc.PlantOptions())
 
 

@@ -8,7 +8,7 @@ import pytest
 from places import DOCS
 
 import template_control as tc
-from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
+from template_control.embedding.options import FREE_PLANNER, EmbeddingOptions
 from template_control.errors import RobotError
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.mujoco import MujocoOptions
@@ -281,7 +281,7 @@ def test_legs_of_four_hinges_walk(load, text, above, plant):
             robot,
             planner=tc.LqrPlanner(tc.default_gait(robot), FREE_PLANNER),
             steps=8,
-            controller=FreeOptions(),
+            controller=EmbeddingOptions.of_kind("free"),
             world=plant,
         )
     )

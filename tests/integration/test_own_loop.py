@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import template_control as tc
-from template_control.embedding.free.options import FREE_PLANNER
+from template_control.embedding.options import FREE_PLANNER
 from template_control.errors import ParameterError
 from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
 from template_control.robot.start import state_at_vlo

@@ -33,6 +33,7 @@ from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import APEX
 from template_control.slip.parameters import SlipParameters
 from template_control.view.figures import FIGURES, save_figures
+from template_control.whole_body.solver import QpOptions
 from template_control.whole_body.tasks import ComTask, FootTask, MomentumTask, PostureTask
 
 P = SlipParameters(leg_stiffness=25e3)
@@ -159,7 +160,9 @@ def hop(hops=HOPS, robot="five-link", **options):
         feet_velocity=np.zeros((2, 2)),
     )
     o = Experiment(
-        steps=hops, pose=start, controller=EmbeddingOptions(phases=PHASES, torque_scale=2.0)
+        steps=hops,
+        pose=start,
+        controller=EmbeddingOptions(phases=PHASES, qp=QpOptions(torque_scale=2.0)),
     )
     robot = load_robot(robot) if isinstance(robot, str) else robot
     return simulate(replace(o, **options, robot=robot, planner=planner, automaton=HOPPING))
@@ -242,7 +245,7 @@ def test_a_monopod_hops_on_its_only_leg(tmp_path, world):
         phase: replace(control, tasks=tuple(t for t in control.tasks if t is not TUCKED))
         for phase, control in PHASES.items()
     }
-    tuning = EmbeddingOptions(phases=of_one_leg, torque_scale=2.0)
+    tuning = EmbeddingOptions(phases=of_one_leg, qp=QpOptions(torque_scale=2.0))
     record = hop(6, robot, controller=tuning, world=world)
     assert record.fall_reason == ""
     assert record.steps == 6

@@ -20,6 +20,7 @@ from template_control.run.simulation import simulate
 from template_control.run.summary import summarise
 from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.parameters import SlipParameters
+from template_control.whole_body.solver import QpOptions
 
 P = SlipParameters()
 
@@ -158,7 +159,7 @@ def test_weak_legs_report_failed_qps_or_a_fall(gait):
     record = walk(
         gait,
         steps=5,
-        controller=EmbeddingOptions(torque_scale=0.2),
+        controller=EmbeddingOptions(qp=QpOptions(torque_scale=0.2)),
     )
     assert record.fell
     assert np.abs(record.torque).max() <= 70.0
@@ -223,7 +224,7 @@ def test_slippery_ground(gait):
         gait,
         steps=12,
         world=PlantOptions(friction=0.5),
-        controller=EmbeddingOptions(friction=0.5),
+        controller=EmbeddingOptions(qp=QpOptions(friction=0.5)),
     )
     assert not record.fell
 

@@ -170,7 +170,7 @@ def test_what_a_free_robot_cannot_do_is_refused(refused):
     planner = tc.LqrPlanner(tc.default_gait(robot))
     for options, culprit in (
         (tc.Experiment(world=tc.IdealOptions()), "ideal"),
-        (tc.Experiment(controller=replace(tc.EmbeddingOptions(), friction=0.5)), "Free"),
+        (tc.Experiment(controller=tc.EmbeddingOptions(trunk_pitch=0.1)), r"of_kind\('free'\)"),
     ):
         with pytest.raises(ParameterError, match=culprit):
             tc.simulate(replace(options, robot=robot, planner=planner))

@@ -181,7 +181,7 @@ def test_robot_runs_at_other_speeds(speed):
 
 @pytest.mark.slow(seconds=7)
 def test_robot_runs_at_five_metres_a_second_with_stronger_motors():
-    record = run(5.0, 40, controller=EmbeddingOptions(torque_scale=1.3))
+    record = run(5.0, 40, controller=EmbeddingOptions(qp=tc.QpOptions(torque_scale=1.3)))
     assert record.fall_reason == ""
     assert record.section_state[-20:, 0].mean() == pytest.approx(5.0, rel=0.01)
 

@@ -43,7 +43,10 @@ def settled(record):
 @pytest.mark.slow(seconds=4)
 def test_five_link_walks_runs_at_three_metres_a_second_and_walks():
     """On ground that is more slippery than the default's, as a push's test has that."""
-    ground, known = tc.PlantOptions(friction=0.5), tc.EmbeddingOptions(friction=0.5)
+    ground, known = (
+        tc.PlantOptions(friction=0.5),
+        tc.EmbeddingOptions(qp=tc.QpOptions(friction=0.5)),
+    )
     record = go("walk_run_walk.toml", "five-link", world=ground, controller=known)
     check(record)
     kinds = strides(record)

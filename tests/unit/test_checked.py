@@ -19,7 +19,6 @@ from template_control.checks.ranges import (
     Range,
     Shape,
 )
-from template_control.embedding.free.options import FreeOptions
 from template_control.embedding.planners.transition import TransitionOptions
 from template_control.errors import ParameterError, RobotError, ScenarioError, SweepError
 from template_control.robot.start import Pose
@@ -123,9 +122,9 @@ def test_no_field_of_any_options_takes_a_stranger(kind):
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: tc.EmbeddingOptions(torque_scale=-1),
-        lambda: tc.EmbeddingOptions(torque_scale=np.nan),
-        lambda: tc.EmbeddingOptions(friction=np.nan),
+        lambda: whole_body.QpOptions(torque_scale=-1),
+        lambda: whole_body.QpOptions(torque_scale=np.nan),
+        lambda: whole_body.QpOptions(friction=np.nan),
         lambda: tc.PlantOptions(friction=np.nan),
         lambda: tc.Push(impulse=np.nan),
         lambda: tc.Experiment(steps=50, pushes=(tc.Push(1.0, step=99),)),
@@ -196,9 +195,13 @@ def test_nothing_that_cannot_be_written_down_loses_a_run(robot, default_gait):
 
 
 def test_a_repr_has_what_is_not_as_by_default():
-    options = tc.EmbeddingOptions(friction=0.5, tasks={"com": {"gains": (80.0, 18.0)}})
+    options = tc.EmbeddingOptions(trunk_pitch=0.1, tasks={"com": {"gains": (80.0, 18.0)}})
     assert repr(tc.EmbeddingOptions()) == "EmbeddingOptions()"
-    assert repr(options) == "EmbeddingOptions(friction=0.5, tasks={'com': {'gains': (80.0, 18.0)}})"
+    assert repr(options) == (
+        "EmbeddingOptions(trunk_pitch=0.1, tasks={'com': {'gains': (80.0, 18.0)}})"
+    )
+    strong = tc.EmbeddingOptions(qp=whole_body.QpOptions(torque_scale=2.0))
+    assert repr(strong) == "EmbeddingOptions(qp=QpOptions(torque_scale=2.0))"
     assert repr(tc.Push(5.0, 2)) == "Push(impulse=5.0, step=2)"
     assert repr(tc.Experiment()) == "Experiment()"
 
@@ -222,7 +225,12 @@ def test_help_fits_a_screen(thing):
 
 @pytest.mark.parametrize(
     "thing",
-    [tc.EmbeddingOptions(), FreeOptions(), tc.Experiment().resolved(), AUTOMATON],
+    [
+        tc.EmbeddingOptions(),
+        tc.EmbeddingOptions.of_kind("free"),
+        tc.Experiment().resolved(),
+        AUTOMATON,
+    ],
     ids=lambda thing: type(thing).__name__,
 )
 def test_a_repr_fits_a_few_lines(thing):

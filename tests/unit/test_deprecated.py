@@ -20,6 +20,7 @@ OLD_NAMES = {
     "template_control.embedding.Free",
     "template_control.embedding.FreeController",
     "template_control.embedding.FreeControls",
+    "template_control.embedding.FreeOptions",
     "template_control.embedding.FrictionOptions",
     "template_control.embedding.gaits_by_speed",
     "template_control.embedding.LandingPlanner",

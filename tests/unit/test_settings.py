@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import template_control as tc
 from template_control import settings
+from template_control.embedding.options import KINDS
 from template_control.embedding.phases import PHASES
 from template_control.errors import ParameterError
 from template_control.robot.start import Pose
@@ -121,7 +122,7 @@ ROUND_TRIPS = {
     "simulation": tc.Experiment(
         steps=17,
         world=tc.IdealOptions(mass_scale=1.1),
-        controller=tc.EmbeddingOptions(friction=0.123456789012345),
+        controller=tc.EmbeddingOptions(qp=tc.QpOptions(friction=0.123456789012345)),
         start=(1.1, 0.97, -0.0),
         pushes=(tc.Push(10.0), tc.Push(-3.0, 4, 0.5)),
         sensors=tc.SensorOptions(1e-3, 2e-2, 5, 0.02),
@@ -167,3 +168,52 @@ def test_a_gait_of_ones_own_is_given_in_python_only():
     gait = Gait("hop", tc.SlipParameters(), np.array([0.0, 1.02]), np.zeros(6), 0.0, 0.5, "hop")
     with pytest.raises(ParameterError, match="motion is Gait, which TOML cannot say"):
         settings.to_table(tc.Experiment(motion=gait))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("changes", [{}, {"noise_filter": None, "swing": None, "catches": True}])
+def test_options_of_a_kind_of_robot_come_back(kind, changes):
+    options = tc.EmbeddingOptions.of_kind(kind, **changes)
+    table = tomllib.loads(settings.text(settings.to_table(options)))
+    assert settings.from_table(tc.EmbeddingOptions, table) == options
+
+
+def test_a_table_of_a_kind_has_what_differs_from_it():
+    usual = tc.EmbeddingOptions.of_kind("soles")
+    table = {"kind": "soles", "lateral": {"reach": 0.3}, "qp": {"friction": 0.5}}
+    found = settings.from_table(tc.EmbeddingOptions, table)
+    assert found.lateral == replace(usual.lateral, reach=0.3)
+    assert found.qp == replace(usual.qp, friction=0.5)
+    assert replace(found, lateral=usual.lateral, qp=usual.qp) == usual
+    assert settings.from_table(tc.EmbeddingOptions, {"kind": "free", "noise_filter": "none"}) == (
+        tc.EmbeddingOptions.of_kind("free", noise_filter=None)
+    )
+
+
+def test_another_kind_keeps_what_was_set():
+    options = tc.EmbeddingOptions(trunk_pitch=0.1, qp=tc.QpOptions(friction=0.5))
+    found = settings.changed(options, {"kind": "trot", "lateral.reach": 0.3})
+    usual = tc.EmbeddingOptions.of_kind("trot")
+    assert found == replace(
+        usual, trunk_pitch=0.1, qp=options.qp, lateral=replace(usual.lateral, reach=0.3)
+    )
+
+
+def test_keys_that_went_to_a_table_of_their_own_are_read_where_they_were():
+    text = "kind = 'free'\nfriction = 0.5\nstep_width = 0.3\nqp.torque_scale = 0.9"
+    usual = tc.EmbeddingOptions.of_kind("free")
+    found = settings.from_table(tc.EmbeddingOptions, tomllib.loads(text))
+    assert found.qp == replace(usual.qp, friction=0.5, torque_scale=0.9)
+    assert found.lateral == replace(usual.lateral, step_width=0.3)
+    keys = {"friction": 0.4, "qp.speed_share": 0.8, "stop_share": 0.1}
+    changed = settings.changed(found, keys)
+    assert changed.qp == replace(found.qp, friction=0.4, speed_share=0.8, stop_share=0.1)
+    with pytest.raises(ParameterError, match=r"friction is given by two keys: give qp.friction"):
+        settings.changed(found, {"friction": 0.4, "qp.friction": 0.4})
+    with pytest.raises(ParameterError, match=r"^qp.friction is -1"):
+        settings.changed(found, {"friction": -1.0})
+
+
+def test_an_unknown_kind_is_one_line():
+    with pytest.raises(ParameterError, match=r"kind is 'hexapod': give one of planar, free, soles"):
+        tc.Experiment().with_({"controller.kind": "hexapod"})

@@ -21,7 +21,6 @@ from template_control.embedding.free.lateral import (
     LateralPlanner,
     early_touchdown,
 )
-from template_control.embedding.free.options import SOLE_STAND, FreeOptions
 from template_control.embedding.free.sway import LOWEST
 from template_control.embedding.modes import Mode
 from template_control.embedding.planners.planner import Cause, Context, Decision, decided
@@ -34,7 +33,7 @@ from template_control.robot.terms import UP, onward
 from template_control.slip.automaton.hybrid import Node
 from template_control.slip.automaton.vocabulary import Event, StrideKind
 from template_control.slip.gaits.gait import Gait
-from template_control.slip.lateral.gait import LateralWish, Side
+from template_control.slip.lateral.gait import LateralOptions, LateralWish, Side
 from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.section import APEX, REST, Section
 from template_control.slip.parameters import SlipParameters
@@ -60,6 +59,9 @@ BANK_RATE = 0.2  # of the roll into a turn's curve [rad/s, of the reference temp
 # template], and comes there with this time constant [s, the same].
 FACING_RATE = 0.18
 FACING_TIME = 1.7
+SOLE_STAND = 0.24
+"""Lateral distance of two soles that stand, over l0. With that of a walk's steps G1's soles
+enclosed 8 mm less than 15 N s to a side take without a step."""
 TURNED_ROUND = 1.0
 """Angle between the course and a new one from which on the robot stops in between [rad]."""
 
@@ -109,7 +111,7 @@ class LateralMotion:
         self,
         robot: FloatingBaseBiped,
         parameters: SlipParameters,
-        options: FreeOptions,
+        options: LateralOptions,
         feet: Feet,
         references: References,
         data: Any,
@@ -121,7 +123,7 @@ class LateralMotion:
         self.robot, self._feet, self._references = robot, feet, references
         rolling = robot.foot_radius / parameters.rest_length if robot.paired else 0.0
         wish = LateralWish(step)
-        self.planner = LateralPlanner(parameters, options.lateral, wish, data, robot.sway, rolling)
+        self.planner = LateralPlanner(parameters, options, wish, data, robot.sway, rolling)
         data["bank_rate"] = BANK_RATE / scale.time
         data["unit"], data["pressure"] = scale.time, np.nan
         data["half_width"] = robot.half_width

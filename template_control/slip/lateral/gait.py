@@ -57,6 +57,8 @@ class LateralOptions(Checked):
         step_cost: on the next foot's distance to the stance foot, over the gait's [1/m^2].
         widths: least and largest lateral distance between two footholds [m]: feet do not cross,
             and legs open so far only.
+        step_width: lateral distance between left and right footholds [m]. Wider, and the robot
+            sways more than its slow steps bear; narrower, and a push leaves less room.
         running_width: of a gait that begins in flight, over the wanted lateral distance of the
             footholds. Nearer to the line below the CoM, heavy legs turn the trunk less.
         reach: largest lateral distance between CoM and foot at touchdown [m].
@@ -69,6 +71,7 @@ class LateralOptions(Checked):
     )
     step_cost: Positive = tuned(0.02, PER_LENGTH_SQUARED)
     widths: Interval = tuned((0.08, 0.6), LENGTH)
+    step_width: NotNegative = tuned(0.22, LENGTH)
     running_width: Share = tuned(1.0)
     reach: Positive = tuned(0.4, LENGTH)
     hold: NotNegative = tuned(0.042, TIME)

@@ -107,11 +107,11 @@ def written_and_read(experiment, tmp_path):
         ("--no-catch", "controller.catches", False),
         ("--plant ideal", "world", tc.IdealOptions()),
         ("--friction 0.5", "world.friction", 0.5),
-        ("--friction 0.5", "controller.friction", 0.5),
-        ("--plant ideal --friction 0.5", "controller.friction", 0.5),
+        ("--friction 0.5", "controller.qp.friction", 0.5),
+        ("--plant ideal --friction 0.5", "controller.qp.friction", 0.5),
         ("--terrain slope:angle=4", "world.terrain", "slope"),
         ("--mass-scale 1.1", "world.mass_scale", 1.1),
-        ("--torque-scale 0.9", "controller.torque_scale", 0.9),
+        ("--torque-scale 0.9", "controller.qp.torque_scale", 0.9),
         ("--push 5@1", "pushes", (tc.Push(5.0, 1),)),
         ("--noise 0.001", "sensors.noise", 1e-3),
         ("--contact-errors 0.01", "sensors.contact_errors", 0.01),
@@ -273,7 +273,7 @@ def test_a_key_of_a_text_needs_no_quotes(understood):
     found = experiment_from(line, tc.Experiment())
     assert found.motion == GaitSpec("run")
     assert found.world.friction == 0.4
-    assert found.resolved().controller.friction == 0.7, "it is another key"
+    assert found.resolved().controller.qp.friction == 0.7, "it is another key"
 
 
 def test_keys_come_before_those_of_the_file(understood, tmp_path):

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from contact_flags import take_in
 
-from template_control.embedding.free.options import FreeOptions, TrotOptions, default_options
 from template_control.embedding.modes import modes
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.options import EmbeddingOptions, robot_kind
 from template_control.embedding.swing import FEET, spread_contacts
 from template_control.embedding.tick import TICK, stand
 from template_control.estimation.contacts import CONTACTS, ContactOptions, set_contacts
@@ -43,18 +42,20 @@ def test_a_foot_stands_on_one_of_its_contacts():
 
 
 @pytest.mark.parametrize(
-    ("options", "node", "bears"),
+    ("kind", "node", "bears"),
     [
-        (FreeOptions(), "SS_sc^r", []),
-        (FreeOptions(), "SS_av^w", [0]),
-        (TrotOptions(), "SS_sc^r", []),
-        (TrotOptions(), "SS_av^w", [0]),
+        ("free", "SS_sc^r", []),
+        ("free", "SS_av^w", [0]),
+        ("trot", "SS_sc^r", []),
+        ("trot", "SS_av^w", [0]),
     ],
 )
-def test_a_foot_that_has_bounced_bears_nothing_in_a_run(options, node, bears):
+def test_a_foot_that_has_bounced_bears_nothing_in_a_run(kind, node, bears):
     robot = load_floating_robot("bolt")
     tick, qp = np.zeros(1, TICK), np.zeros(1, QP_DATA)
-    tick["mode"] = modes(AUTOMATON, robot.nv, options.phases)[node].data
+    tick["mode"] = modes(AUTOMATON, robot.nv, EmbeddingOptions.of_kind(kind).phase_table())[
+        node
+    ].data
     tick["feet"]["roles"] = 0, 1
     stand(tick, robot.data, References().data, qp)
     assert qp["contact"][0, : int(qp["contacts"][0])].tolist() == bears
@@ -104,22 +105,22 @@ def test_their_places_turn_with_the_trunk():
 @pytest.mark.parametrize(
     ("robot", "kind"),
     [
-        (RobotSpec("go2", free=True), TrotOptions),
-        (RobotSpec("bolt", free=True), FreeOptions),
-        (RobotSpec("bolt"), EmbeddingOptions),
+        (RobotSpec("go2", free=True), "trot"),
+        (RobotSpec("bolt", free=True), "free"),
+        (RobotSpec("bolt"), "planar"),
     ],
 )
 def test_each_kind_of_robot_has_its_own_tuning(robot, kind, tmp_path):
     experiment = Experiment(robot)
-    assert type(experiment.tuning) is kind
-    assert type(default_options(robot.load())) is kind
-    assert type(experiment.with_({"robot.gravity": 1.62}).tuning) is kind
+    assert experiment.tuning == EmbeddingOptions.of_kind(kind)
+    assert robot_kind(robot.load()) == kind
+    assert experiment.with_({"robot.gravity": 1.62}).tuning == EmbeddingOptions.of_kind(kind)
     saved = experiment.save(tmp_path / "run.toml")
     assert Experiment.load(saved) == experiment.resolved()
 
 
 def test_another_robot_takes_another_tuning():
     experiment = Experiment(RobotSpec("bolt", free=True)).resolved()
-    assert type(experiment.with_({"robot.model": "go2"}).tuning) is TrotOptions
+    assert experiment.with_({"robot.model": "go2"}).tuning == EmbeddingOptions.of_kind("trot")
     own = replace(experiment, robot=load_robot("five-link"), controller=None)
-    assert type(own.tuning) is EmbeddingOptions
+    assert own.tuning == EmbeddingOptions()

@@ -210,7 +210,7 @@ def test_the_guard_that_fires_is_the_first_of_its_node(kind, vlo, apex, drop, st
 def test_a_robot_that_is_over_its_foot_has_passed_the_bottom(node, x, vertical, fires):
     """In a run-to-walk stride, whose stance ends there; that of a run may have it later."""
     tick = np.zeros(1, TICK)
-    tick["mode"] = modes(AUTOMATON, 7, EmbeddingOptions().phases)[node].data
+    tick["mode"] = modes(AUTOMATON, 7, EmbeddingOptions().phase_table())[node].data
     set_guards(tick["guards"], P, GuardOptions())
     tick["path"]["event_times"] = np.inf
     tick["sensed"]["state"] = x, 0.95, 0.7, vertical

@@ -6,7 +6,6 @@ from places import EXAMPLES
 
 import template_control as tc
 from template_control.cli.experiment_options import experiment_from
-from template_control.embedding import FreeOptions
 from template_control.errors import ParameterError
 from template_control.slip import Phase
 from template_control.whole_body import ComTask, FootTask, PostureTask
@@ -21,7 +20,7 @@ def test_a_name_alone_stands_for_the_task_of_all_phases():
     found = [t for c in options.phase_table().values() for t in c.tasks if isinstance(t, ComTask)]
     assert {task.gains for task in found} == {(80.0, 18.0)}
     assert len({task.weight for task in found}) > 1, "their weights are as they were"
-    assert options.phases == tc.EmbeddingOptions().phases
+    assert options.phases is None, "the table stays as it is"
 
 
 def test_a_phase_or_a_node_is_named_before_the_task():
@@ -53,7 +52,7 @@ def test_a_wrong_name_is_refused(wrong, told):
 
 
 def test_a_floating_base_robot_has_tasks_of_its_own():
-    options = FreeOptions(tasks={"side_foot": {"weight": 2.0}})
+    options = tc.EmbeddingOptions.of_kind("free", tasks={"side_foot": {"weight": 2.0}})
     assert options.phase_table()[Phase.SS].tasks[3].weight == 2.0
 
 

@@ -1,13 +1,11 @@
 """A free robot's state from noisy measurements of all of it."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
 import template_control as tc
-from template_control.embedding import FREE_PLANNER, EmbeddingController, FreeOptions
+from template_control.embedding import FREE_PLANNER, EmbeddingController, EmbeddingOptions
 from template_control.estimation import NoiseFilter, NoiseFilterOptions
 from template_control.robustness.severity_sweep import gait_errors
 from template_control.run.sensing import FilteredSensors, Sensors, senses_of
@@ -102,7 +100,9 @@ def test_only_noise_is_filtered(bolt):
     noisy = tc.SensorOptions(noise=1e-3)
     assert isinstance(senses(bolt, tc.SensorOptions()), Sensors)
     assert isinstance(senses(bolt, noisy), FilteredSensors)
-    assert isinstance(senses(bolt, noisy, replace(FreeOptions(), noise_filter=None)), Sensors)
+    assert isinstance(
+        senses(bolt, noisy, EmbeddingOptions.of_kind("free", noise_filter=None)), Sensors
+    )
 
 
 @pytest.mark.slow(seconds=4)

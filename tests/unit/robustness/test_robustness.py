@@ -104,7 +104,7 @@ def test_options_hold_the_level(robot, gait, monkeypatch):
     assert of("friction", 0.4).world.friction == 0.4
     assert of("heavier", 0.2).world.mass_scale == pytest.approx(1.2)
     assert of("lighter", -0.2).world.mass_scale == pytest.approx(0.8)
-    assert of("torque", 0.7).controller.torque_scale == 0.7
+    assert of("torque", 0.7).controller.qp.torque_scale == 0.7
     noise = of("noise", 1e-3, 4).sensors
     assert (noise.deviations(Scale(1.0, 1.0)), noise.seed) == ((1e-3, 0.02), 4)
     assert of("delay", 4e-3).delay_ticks == 4
@@ -304,8 +304,8 @@ def test_a_free_robot_is_pushed_aside_too():
     turned = {d.name: d.experiment(where, 0.1, 3).pushes[0].direction for d in LATERAL_PUSHES}
     assert turned == {"push-left": np.pi / 2, "push-right": -np.pi / 2}
     weak = BY_NAME["torque"].experiment(where, 0.9, 0).controller
-    assert isinstance(weak, tc.embedding.FreeOptions)
-    assert weak.torque_scale == 0.9
+    assert weak.kind == "free"
+    assert weak.qp.torque_scale == 0.9
 
 
 @pytest.mark.slow(seconds=4)

@@ -98,7 +98,9 @@ def parsed(understood):
 def test_every_option_has_its_place(parsed):
     simulation = parsed(DISTURBED)
     assert simulation.world == replace(default_plant(), friction=0.6, mass_scale=1.05)
-    assert simulation.controller == tc.EmbeddingOptions(friction=0.6, torque_scale=0.9)
+    assert simulation.controller == tc.EmbeddingOptions(
+        qp=tc.QpOptions(friction=0.6, torque_scale=0.9)
+    )
     assert simulation.pushes == (tc.Push(-8.0, 1, 0.3), tc.Push(5.0, 0, 0.0))
     assert simulation.sensors == tc.SensorOptions(noise=5e-4)
     assert (simulation.delay, simulation.steps, simulation.record_every) == (0.002, 2, 2)

@@ -29,7 +29,7 @@ def weak_walk(robot, default_gait, caplog):
                 robot,
                 planner=tc.LqrPlanner(default_gait),
                 steps=10,
-                controller=tc.EmbeddingOptions(torque_scale=0.07),
+                controller=tc.EmbeddingOptions(qp=tc.QpOptions(torque_scale=0.07)),
                 world=tc.PlantOptions(),
             )
         )

@@ -5,8 +5,7 @@ import pytest
 
 import template_control as tc
 from template_control.embedding.controller import EmbeddingController
-from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.options import FREE_PLANNER, EmbeddingOptions
 from template_control.embedding.phases import PHASES
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.embedding.planners.running import RunningPlanner
@@ -42,7 +41,7 @@ def test_a_run_begins_once(kind):
     else:
         planner = LqrPlanner(walking_gait(parameters, 1.1))
     counts = _count_resets(planner)
-    tuning = FreeOptions() if free else EmbeddingOptions(catches=False)
+    tuning = EmbeddingOptions.of_kind("free") if free else EmbeddingOptions(catches=False)
     record = simulate(Experiment(robot, planner=planner, steps=1, controller=tuning))
     assert record.steps == 1
     assert len(counts) == 1

@@ -7,8 +7,7 @@ import pytest
 from places import EXAMPLES
 
 from template_control.cli.main import main
-from template_control.embedding.free.options import FREE_PLANNER, FreeOptions
-from template_control.embedding.options import EmbeddingOptions
+from template_control.embedding.options import FREE_PLANNER, EmbeddingOptions
 from template_control.embedding.planners.lqr import LqrOptions
 from template_control.errors import ParameterError
 from template_control.plant.plant import Plant
@@ -96,7 +95,7 @@ def test_the_file_holds_what_the_run_used_and_repeats_it(line, held, tmp_path):
 def test_the_default_is_the_robots_own_and_a_given_one_is_kept():
     free = RobotSpec("bolt", free=True)
     assert Experiment(free).resolved().planner == FREE_PLANNER
-    assert Experiment(free).resolved().controller == FreeOptions()
+    assert Experiment(free).resolved().controller == EmbeddingOptions.of_kind("free")
     assert Experiment().resolved().planner == LqrOptions()
     assert Experiment().resolved().controller == EmbeddingOptions()
     given = Experiment(free, planner=LqrOptions())
@@ -124,8 +123,10 @@ def test_a_free_trial_is_written_with_the_planner_that_it_has(tmp_path):
 
 @pytest.mark.parametrize("free", [False, True])
 def test_tuning_of_the_other_kind_of_robot_is_refused(free):
-    tuning = EmbeddingOptions() if free else FreeOptions()
-    name, had = type(tuning).__name__, "has a floating base" if free else "is held in its plane"
+    kind, right = ("planar", "free") if free else ("free", "planar")
+    tuning = EmbeddingOptions.of_kind(kind)
+    had = "has a floating base" if free else "is held in its plane"
     experiment = Experiment(RobotSpec("bolt", free=free), controller=tuning)
-    with pytest.raises(ParameterError, match=f"{had}, and its embedding has {name}: give"):
+    told = rf"{had}, and its embedding has options of kind '{kind}' .*: give .*'{right}'"
+    with pytest.raises(ParameterError, match=told):
         simulate(experiment)

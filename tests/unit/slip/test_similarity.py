@@ -109,8 +109,9 @@ def test_each_number_is_scaled_by_its_dimension():
 
 def test_the_tasks_in_the_table_of_phases_are_scaled_too():
     scale = Scale(length=0.25, time=0.5)
-    options = scaled(EmbeddingOptions(), scale)
-    for phase, control in EmbeddingOptions().phases.items():
+    table = EmbeddingOptions().phase_table()
+    options = scaled(EmbeddingOptions(phases=table), scale)
+    for phase, control in table.items():
         for task, other in zip(control.tasks, options.phases[phase].tasks, strict=True):
             if hasattr(task, "gains"):
                 assert other.gains == (task.gains[0] * 4.0, task.gains[1] * 2.0)

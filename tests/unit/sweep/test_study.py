@@ -14,7 +14,7 @@ from template_control.cli.main import main
 from template_control.errors import ParameterError
 
 QUESTIONS = EXAMPLES / "questions"
-BOTH = "world.friction controller.friction"
+BOTH = "world.friction controller.qp.friction"
 SMALL = tc.sweep.Study(
     about="small",
     experiment={"steps": 1, "record_every": 10},
@@ -31,7 +31,7 @@ def answered():
 
 def test_a_key_in_two_places_has_one_value():
     world = SMALL.trial(SMALL.items()[0])
-    assert (world.world.friction, world.controller.friction, world.steps) == (0.5, 0.5, 1)
+    assert (world.world.friction, world.controller.qp.friction, world.steps) == (0.5, 0.5, 1)
 
 
 def test_figures_are_those_of_the_runs(answered):

@@ -48,7 +48,7 @@ def cut(record, samples):
 @pytest.mark.parametrize("kind", ["two samples", "fallen", "no step"])
 def test_every_run_has_every_figure(record, gait, kind, tmp_path):
     if kind == "fallen":
-        weak = tc.EmbeddingOptions(torque_scale=0.2)
+        weak = tc.EmbeddingOptions(qp=tc.QpOptions(torque_scale=0.2))
         record = walk(gait, 4, controller=weak)
         assert record.fell
     else:

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from template_control.embedding.free.options import FreeOptions
+from template_control.embedding.options import EmbeddingOptions
 from template_control.errors import ParameterError
 from template_control.robot.library import load_floating_robot, load_robot
 from template_control.robot.start import Pose, floating_state_in
@@ -26,8 +26,8 @@ FRICTION = 0.6
 OPTIONS = QpOptions(
     friction=FRICTION,
     friction_margin=1.0,
-    stop_share=FreeOptions().stop_share,
-    stop_horizon=FreeOptions().stop_horizon,
+    stop_share=EmbeddingOptions.of_kind("free").qp.stop_share,
+    stop_horizon=EmbeddingOptions.of_kind("free").qp.stop_horizon,
 )
 TASKS = {
     0: (OrientationTask(), FootTask(Leg.REAR), SideFootTask(Leg.REAR)),

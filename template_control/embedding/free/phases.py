@@ -1,4 +1,4 @@
-"""Tuning of the embedding of floating-base robots, and their tables of phases.
+"""Phases of floating-base robots: on two points, on two soles, on two pairs of legs.
 
 On two points nothing holds the trunk about the line between the feet but the momentum of the legs.
 
@@ -13,13 +13,8 @@ moment comes from how the template's force is shared: the trunk is simply kept l
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from dataclasses import replace
 
-from template_control.checks.ranges import NotNegative, Positive, Share
-from template_control.embedding.lean import LeanOptions
-from template_control.embedding.options import EmbeddingOptions, Planning
 from template_control.embedding.phases import (
     RUNNING_SWING,
     PhaseControl,
@@ -27,17 +22,8 @@ from template_control.embedding.phases import (
     running_phases,
     standing_phases,
 )
-from template_control.embedding.planners.ahead import BIPED_AHEAD, FREE_AHEAD
-from template_control.embedding.planners.lqr import LqrOptions
-from template_control.embedding.rollout import ReplanOptions
-from template_control.embedding.swing import SwingOptions
-from template_control.estimation.filters import NoiseFilterOptions
-from template_control.robot.biped import Biped
-from template_control.robot.terms import LEGS, UP
 from template_control.slip.automaton.vocabulary import Leg, Phase
-from template_control.slip.lateral.gait import LateralOptions
 from template_control.slip.planning.pressure import UNLOADING
-from template_control.slip.similarity import LENGTH, TIME, tuned
 from template_control.whole_body.task import Task
 from template_control.whole_body.tasks import (
     ComTask,
@@ -200,117 +186,3 @@ TROT_PHASES: Phases = {
     **standing_phases(_PAIR_STANDING, _PAIR_STANCE, UNLOADING),
 }
 """Standing, walking and running trot. Nodes of other gaits find the entry of their phase."""
-
-
-FREE_PLANNER = LqrOptions(earliest_touchdown=0.1, earliest_share=1.0, trusted_price=0.3)
-"""Tuning of a floating-base robot's LQR planner.
-
-Its swing leg has to move sideways too, and needs time. Its first steps from a start are further
-from the gait than a planar robot's, and the law of a slow gait is good in its neighbourhood only:
-at 0.4 m/s it led Bolt from an error of 2 mm to one of 0.1 m/s. So the search begins earlier.
-"""
-
-# A heavy leg needs longer to get in front. After a step up a foot was to land 0.08 s after VLO
-# (l0 = 0.67 m); it landed next to the other one, and G1 fell.
-_SOLE_PLANNER = replace(FREE_PLANNER, earliest_touchdown=0.15, earliest_share=0.2)
-
-
-@dataclass(frozen=True)
-class FreeOptions(EmbeddingOptions):
-    """Tuning of the embedding of a free robot.
-
-    The fields of :class:`~template_control.embedding.options.EmbeddingOptions` come first.
-
-    Attributes:
-        phases: the table of two points.
-        swing: shape of the swings. A foot has to move sideways too, and is not asked to be high.
-        catches: a free robot has no run to break into.
-        lateral: how the feet are placed sideways.
-        noise_filter: of a state that is measured with noise; None: it is taken as it is measured.
-        step_width: lateral distance between left and right footholds [m]. Wider, and the robot
-            sways more than its slow steps bear; narrower, and a push leaves less room.
-        stop_share: joints slow down before their stops at any speed: hips that swing sideways come
-            to theirs slowly, with the robot's weight behind them.
-        stop_horizon: a joint's speed is at most the way to its stop over this time [s].
-    """
-
-    kind: ClassVar[str] = "free"
-    planning: ClassVar[Planning] = Planning(FREE_PLANNER, BIPED_AHEAD)
-
-    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(FREE_PHASES))
-    swing: SwingOptions | None = field(default_factory=SwingOptions)
-    catches: bool = tuned(False)
-    lateral: LateralOptions = field(default_factory=LateralOptions)
-    noise_filter: NoiseFilterOptions | None = field(default_factory=NoiseFilterOptions)
-    step_width: NotNegative = tuned(0.22, LENGTH)
-    stop_share: Share = tuned(0.0)
-    stop_horizon: Positive = tuned(0.05, TIME)
-
-
-@dataclass(frozen=True)
-class SoleOptions(FreeOptions):
-    """Tuning of a robot on flat feet; the fields of :class:`FreeOptions` come first.
-
-    Attributes:
-        phases: the table of soles.
-        swing: shape of the swings; None: by the hips' speed, and the reference waits for the foot.
-        replan: where hips are at their limits, the leg that they swing changes the CoM's speed by
-            0.05 m/s within a step, and back; planned anew from there, TALOS walked 2.8 % too fast.
-        lean: none: the trunk stays upright.
-        lateral: heavy legs run with their feet at half of the walk's distance, just side by side;
-            at all of it they turn the trunk by 0.36 rad to either side, and by 0.7 as they begin.
-    """
-
-    kind: ClassVar[str] = "soles"
-    # Ahead it held all 18 of G1's disturbed walks in which the LQR's search fell.
-    planning: ClassVar[Planning] = Planning(_SOLE_PLANNER, BIPED_AHEAD, True, bears=True)
-
-    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(SOLE_PHASES))
-    swing: SwingOptions | None = None
-    replan: ReplanOptions = field(default_factory=lambda: ReplanOptions(speed=0.07))
-    lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
-    lateral: LateralOptions = field(default_factory=lambda: LateralOptions(running_width=0.5))
-
-
-@dataclass(frozen=True)
-class TrotOptions(FreeOptions):
-    """Tuning of a quadruped; the fields of :class:`FreeOptions` come first.
-
-    Attributes:
-        phases: the table of pairs of legs.
-        lean: none: the trunk stays level.
-        lateral: pairs of legs may cross, as a push may want them to.
-        step_width: lateral distance between the footholds of both pairs [m]: none, as the middle of
-            either pair is below the trunk's.
-    """
-
-    kind: ClassVar[str] = "trot"
-    planning: ClassVar[Planning] = Planning(FREE_PLANNER, FREE_AHEAD, bears=True)
-
-    phases: Mapping[Phase | str, PhaseControl] = field(default_factory=lambda: dict(TROT_PHASES))
-    lean: LeanOptions = field(default_factory=lambda: LeanOptions({}))
-    lateral: LateralOptions = field(default_factory=lambda: LateralOptions(widths=(-0.6, 0.6)))
-    step_width: NotNegative = tuned(0.0, LENGTH)
-
-
-SOLE_STAND = 0.24
-"""Lateral distance of two soles that stand, over l0. With that of a walk's steps G1's soles
-enclosed 8 mm less than 15 N s to a side take without a step."""
-
-AnyOptions = EmbeddingOptions | FreeOptions | TrotOptions | SoleOptions
-"""Options of a kind of robot."""
-
-
-def options_of_kind(*, free: bool, flat: bool, trots: bool) -> AnyOptions:
-    """Options of a kind of robot: with a floating base, on flat feet, with four legs."""
-    if trots:
-        return TrotOptions()
-    if free and flat:
-        return SoleOptions()
-    return FreeOptions() if free else EmbeddingOptions()
-
-
-def default_options(robot: Biped) -> AnyOptions:
-    """Options of a robot's kind."""
-    free, trots = robot.directions > UP, len(robot.feet) > LEGS
-    return options_of_kind(free=free, flat=bool(robot.patches), trots=trots)
