@@ -18,7 +18,8 @@ from template_control.robot.terms import MOST_SPARE, UP, onward
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 _PITCH = 2  # place of a planar robot's pitch in q
-_SIDE = 1  # y of a floating-base robot's feet, to the left
+# Axes of rows. Numba would compile a callee once more for each literal that it is handed.
+_AHEAD, _SIDE, _UPWARD = np.int64(0), np.int64(1), np.int64(UP)
 _YAW = 2
 # An error of the yaw counts as this much at most in a run [rad]: more momentum about the vertical
 # than it asks for is more than ab- and adduction have, and roll is lost with it.
@@ -65,7 +66,7 @@ def com_rows(task: Any, r: Any, arrays: tuple[Any, ...], want: Any, rows: Array)
     """Write the rows of a :class:`ComTask`, and ``lift`` of references; see :func:`write_rows`."""
     com, kp, kd = arrays[2], task.gains[0], task.gains[1]
     up, nv, ref, now = com.shape[0] - 1, com.shape[1], want.com, want.com_now
-    _momentum_speed_row(r, arrays, now[1], 0, rows[0])
+    _momentum_speed_row(r, arrays, now[1], _AHEAD, rows[0])
     for k in range(nv):
         rows[1, k] = com[up, k]
     rows[1, nv + BIAS] = r.com_bias[UP]
@@ -99,8 +100,8 @@ def _contact_row(task: Any, r: Any, contact: Array, want: Any, axis: int, row: A
 @compiled
 def foot_rows(task: Any, r: Any, contact: Array, want: Any, rows: Array) -> None:
     """Write the rows of a :class:`FootTask`."""
-    _contact_row(task, r, contact, want, 0, rows[0])
-    _contact_row(task, r, contact, want, UP, rows[1])
+    _contact_row(task, r, contact, want, _AHEAD, rows[0])
+    _contact_row(task, r, contact, want, _UPWARD, rows[1])
     foot, nv = want.feet[task.leg], contact.shape[2]
     point = r.group[foot, task.contact]
     ahead = want.furthest[foot] + want.offset[point, 0, 0] - r.contact_position[point, 0]

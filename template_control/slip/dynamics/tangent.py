@@ -29,6 +29,8 @@ COLUMNS = 3 + NUM_SLOTS
 """What a stride is differentiated by: dx/dt, y, dy/dt at its start, then the controls by Slot."""
 
 _INPUTS = 8  # of a phase: x, y, dx/dt, dy/dt, rear and front toe, rear and front stiffness
+# Legs, and a row. Numba would compile a callee once more for each literal that it is handed.
+_REAR, _FRONT, _LANDED = np.int64(0), np.int64(1), np.int64(2)
 _TOE, _KAPPA = 4, 6
 
 
@@ -222,10 +224,10 @@ def _fire(
         for i in range(4):
             state[i, c] += at[2 + i] * time
     if event in (Event.BOTTOM, Event.VIRTUAL_BOTTOM):
-        _lengthen(0, 0, at, toes, tangents)
-        _lengthen(1, 1, at, toes, tangents)
+        _lengthen(_REAR, _REAR, at, toes, tangents)
+        _lengthen(_FRONT, _FRONT, at, toes, tangents)
     elif event == Event.TOUCHDOWN:
-        _lengthen(2, 0, at, toes, tangents)
+        _lengthen(_LANDED, _REAR, at, toes, tangents)
     note = 0 if event == Event.TOUCHDOWN else 1
     if event in (Event.TOUCHDOWN, Event.REAR_LIFTOFF):
         for c in range(COLUMNS):
@@ -273,9 +275,9 @@ def stride_tangents(kernel: Kernel, controls: Array, scratch: Scratch, tangents:
         step, node = meta[1], int(meta[2])
         rear, front = tables.rear[node], tables.front[node]
         if rear >= 0:
-            _leg_series(0, meta[3], meta[5], body, degree, path, tangents)
+            _leg_series(_REAR, meta[3], meta[5], body, degree, path, tangents)
         if front >= 0:
-            _leg_series(1, meta[4], meta[6], body, degree, path, tangents)
+            _leg_series(_FRONT, meta[4], meta[6], body, degree, path, tangents)
         if rear >= 0 or front >= 0:
             _stance(rear >= 0, front >= 0, step, degree, tangents)
         else:

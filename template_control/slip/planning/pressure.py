@@ -39,6 +39,7 @@ _PULL = 1e-9  # from a bound, which frees nothing
 # A metre by which an end is missed, made good all along a way of a duration T, moves the centre of
 # pressure by 1 m and this over (w T)^2.
 _LED = 6.0
+_FIRST = np.int64(0)  # way; for a literal Numba would compile what it is handed to once more
 _DIRECTIONS = 9  # of x and x' / w at the end, in which an end may be out of reach
 # Largest w times the duration that is planned with, about twice that of a CoM that stays up. One
 # that falls diverges so fast that of the program nothing would be left but rounding.
@@ -277,7 +278,7 @@ def best_way(
     """
     n = p.shape[0]
     pieces = Pieces(np.empty(n), rates, np.empty(n), np.empty(n), np.empty(n))
-    best, chosen = np.inf, 0
+    best, chosen = np.inf, _FIRST
     for i in range(ways.price.shape[0]):
         excess = _excess(start, ways, i, ground, pieces, p, ground.slack)
         if excess <= ground.slack:
