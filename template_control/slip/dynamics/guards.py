@@ -5,22 +5,21 @@ substeps end. Bounds of their second derivatives exclude that one rises in betwe
 it does.
 
 Three kinds of path: ``SERIES`` (the exact kernel's Taylor polynomials), ``STANCE`` (the closed form
-(11) about a pivot) and ``FLIGHT`` (10). Compiled code gives the kind as one of these
-constants, an argument of its own, and Numba compiles that kind alone.
+(11) about a pivot) and ``FLIGHT`` (10). The kind is an argument, and no literal: for each literal
+Numba would compile all that it is handed to once more.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
 
 from template_control.arrays import Array, BoolArray, IntArray
-from template_control.compiled import inner, inner_by_type
+from template_control.compiled import inner
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 
-SERIES, STANCE, FLIGHT = 0, 1, 2
+SERIES, STANCE, FLIGHT = np.int64(0), np.int64(1), np.int64(2)
 COEFFICIENTS = 12
 
 _ARMING = 1e-10  # a guard must have been this far below zero before it can fire
@@ -47,7 +46,8 @@ class Path(NamedTuple):
     b: Array
 
 
-def _series(kind: int, path: Path, t: float, out: Array) -> None:
+@inner
+def _series(path: Path, t: float, out: Array) -> None:
     a, b = path
     x = y = u = v = ax = ay = 0.0
     for n in range(a.shape[0] - 1, -1, -1):
@@ -60,7 +60,8 @@ def _series(kind: int, path: Path, t: float, out: Array) -> None:
     out[0], out[1], out[2], out[3], out[4], out[5] = x, y, u, v, 2.0 * ax, 2.0 * ay
 
 
-def _stance(kind: int, path: Path, t: float, out: Array) -> None:
+@inner
+def _stance(path: Path, t: float, out: Array) -> None:
     a = path.a
     w, swing = a[5], a[7]
     s, c = np.sin(w * t), np.cos(w * t)
@@ -79,16 +80,15 @@ def _stance(kind: int, path: Path, t: float, out: Array) -> None:
     out[5] = radial * s + tangential * c
 
 
-def _flight(kind: int, path: Path, t: float, out: Array) -> None:
+@inner
+def _flight(path: Path, t: float, out: Array) -> None:
     a = path.a
     out[0], out[1] = a[0] + (a[2] - 0.5 * a[5] * t) * t, a[1] + (a[3] - 0.5 * a[4] * t) * t
     out[2], out[3] = a[2] - a[5] * t, a[3] - a[4] * t
     out[4], out[5] = -a[5], -a[4]
 
 
-_BY_KIND = (_series, _stance, _flight)
-
-
+@inner
 def sample(kind: int, path: Path, t: float, out: Array) -> None:
     """Write x, y and their first two derivatives at a time on a path.
 
@@ -98,13 +98,12 @@ def sample(kind: int, path: Path, t: float, out: Array) -> None:
         t: since the start of the path [s].
         out: (6,) overwritten.
     """
-    _BY_KIND[kind](kind, path, t, out)
-
-
-@inner_by_type(sample)
-def _kind(kind: Any, path: Any, t: Any, out: Any) -> Any:
-    """That of the literal ``kind``: Numba would compile the branches of all of them."""
-    return _BY_KIND[kind.literal_value] if isinstance(kind, types.IntegerLiteral) else None
+    if kind == SERIES:
+        _series(path, t, out)
+    elif kind == STANCE:
+        _stance(path, t, out)
+    else:
+        _flight(path, t, out)
 
 
 @inner
