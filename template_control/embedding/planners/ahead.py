@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -34,6 +35,7 @@ from template_control.slip.planning.gait_table import (
 )
 from template_control.slip.planning.look_ahead import (
     AHEAD,
+    FROM_GRID,
     SEARCH,
     PlanProblem,
     make_plan,
@@ -239,9 +241,11 @@ class AheadPlanner(Planner):
         cheapest: _Plan | None = None
         dearest = o.dearest or np.inf
         judged = _NEVER if next_best is None else (o.cheap, dearest)
-        for speed in aims:
+        for search, speed in product((SEARCH, FROM_GRID), aims):
+            if search is FROM_GRID and next_best is not None:
+                break
             hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
-            plan = self._look(context, speed, None, SEARCH._replace(hopeless=hopeless), judged)
+            plan = self._look(context, speed, None, search._replace(hopeless=hopeless), judged)
             if plan.excess <= o.cheap and plan.cost <= dearest and plan.price < price:
                 if plan.excess <= _BEARABLE:
                     return self._begin(plan, z, wanted)

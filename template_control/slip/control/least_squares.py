@@ -27,6 +27,7 @@ class Search(NamedTuple):
     rounds: int  # steps that lower the cost; as many more may be tried again, shorter
     close: float = 0.03  # the last step's length in units of change: what it leaves is its square
     grid: int = 5  # points of each unknown that are tried where the start fails; 0: none
+    gridded: int = 9  # so many unknowns, the first ones, have a grid; the others stay at the start
     save: float = 0.0  # share of the cost that a step has to save for another one
     hopeless: float = np.inf  # cost after two rounds from which on no others follow
     # Damping after a bad step. Where equations weigh more than wishes, less of it stops the latter.
@@ -140,9 +141,10 @@ def _copy(source: _Point, target: _Point) -> None:
 
 
 @compiled_into
-def _from_grid(problem: Any, points: int, there: _Point, best: _Point) -> float:
+def _from_grid(problem: Any, search: Search, there: _Point, best: _Point) -> float:
     """The least cost on a grid within the bounds, its place in ``best``; inf where all fails."""
-    size, least = best.x.shape[0], np.inf
+    points, size, least = search.grid, min(search.gridded, best.x.shape[0]), np.inf
+    copy(best.x, there.x)
     for number in range(points**size):
         left = number
         for i in range(size - 1, -1, -1):
@@ -168,7 +170,7 @@ def least_squares(problem: Any, search: Search, residual: Array, x: Array) -> fl
     copy(x, best.x)
     least = evaluate(problem, best.x, best.residual)
     if not least < np.inf:
-        if not _from_grid(problem, search.grid, there, best) < np.inf:
+        if not _from_grid(problem, search, there, best) < np.inf:
             return np.inf
         least = evaluate(problem, best.x, best.residual)
     slopes(problem, best.x, best.rows)
