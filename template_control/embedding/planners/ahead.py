@@ -131,8 +131,9 @@ class AheadPlanner(Planner):
     A change of speed is planned near one of the library's table, whose steps begin the search.
     Where none leads on, and near the gait, a plan stays near the gait that it leads to: a governor
     tries shares of the wanted change of speed and takes the first whose plan is cheap. Its choice
-    is :attr:`~.planner.Decision.accepted`. Where no plan is cheap, as after a push, the LQR
-    planner's search finds a step to a gait near the present speed.
+    is :attr:`~.planner.Decision.accepted`. Where no plan is cheap, as after a push, plans begin
+    with other first steps; then the LQR planner's search finds a step to a gait near the present
+    speed.
 
     Args:
         parameters: the template; its stiffness k0 counts for nothing, each gait has its own.
