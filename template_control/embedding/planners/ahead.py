@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
@@ -35,7 +34,6 @@ from template_control.slip.planning.gait_table import (
 )
 from template_control.slip.planning.look_ahead import (
     AHEAD,
-    FROM_GRID,
     SEARCH,
     PlanProblem,
     make_plan,
@@ -59,6 +57,8 @@ the reference template; each gait that is made is kept."""
 _SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change; 1 only if no search near one failed
 _HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
 _NEAR_CHANGE = SEARCH._replace(hopeless=1000.0)  # search near a change of the table
+# Points of each control of the first step, from the best of which plans begin where none is cheap.
+_GRID = 3
 _EFFORT = 12  # linearisations of plans, after which no other change of the table is tried
 _OFF = 2.0  # tolerances off a gait, up to which the plan is one near it
 _BEARABLE = 3.0  # excess up to which the first plan that has no more is taken
@@ -213,23 +213,44 @@ class AheadPlanner(Planner):
 
         The decision is nominal where a plan was cheap, whatever was accepted.
         """
-        z, target, angles, _, begun, *_ = context
-        wanted = self._speed if target is None else float(target[0])
-        (low, high), o = self.speeds, self.options
+        z, target, angles, *_ = context
+        wanted, (low, high) = self._speed if target is None else float(target[0]), self.speeds
+        aim, cheapest = float(np.clip(wanted, *self.limits.speeds)), None
+        for grid in (0, _GRID):
+            best, cheapest = self._best_plan(context, aim, grid)
+            if best is not None:
+                return self._begin(best, z, wanted)
+        # No plan is cheap: the search's step, or the cheapest plan's if that is better.
+        speed = min(max(self._spacing * round(float(z[0]) / self._spacing), low), high)
+        decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
+        if decision.lasting or cheapest is None:
+            self._lead_to(float(self._lqr.gait.vlo[0]))
+            return replace(decision, nominal=False, accepted=self._speed)
+        return replace(self._begin(cheapest, z, wanted), nominal=False)
+
+    def _best_plan(
+        self, context: Context, aim: float, grid: int
+    ) -> tuple[_Plan | None, _Plan | None]:
+        """The best plan that leads to a speed [m/s], or towards it, of those that are cheap.
+
+        And the cheapest of all those near gaits. None: there is none.
+        ``grid`` are points of each control of the first step, see :class:`.Search`.
+        """
+        z, begun, (low, high), o = context.z, context.decision, self.speeds, self.options
         present = min(max(float(z[0]), low), high)
-        aim = float(np.clip(wanted, *self.limits.speeds))
         change = min(max(aim - present, -o.pace), o.pace)
         next_best: _Plan | None = None
         price, effort = np.inf, 0
         for goal, way in self._towards(z, aim):
             if effort >= _EFFORT:
                 break
-            plan = self._look(context, goal, way, _NEAR_CHANGE, (_BEARABLE, _DEAREST))
+            search = _NEAR_CHANGE._replace(grid=grid)
+            plan = self._look(context, goal, way, search, (_BEARABLE, _DEAREST))
             effort += plan.effort
             if plan.excess > _BEARABLE or plan.cost > _DEAREST:
                 continue
             if plan.roughness <= _ROUGHEST:
-                return self._begin(plan, z, wanted)
+                return plan, None
             if next_best is None or plan.price < price:
                 next_best, price = plan, plan.price
         aims = list(dict.fromkeys(present + share * change for share in _SHARES[effort > 0 :]))
@@ -242,26 +263,17 @@ class AheadPlanner(Planner):
         cheapest: _Plan | None = None
         dearest = o.dearest or np.inf
         judged = _NEVER if next_best is None else (o.cheap, dearest)
-        for search, speed in product((SEARCH, FROM_GRID), aims):
-            if search is FROM_GRID and next_best is not None:
-                break
+        for speed in aims:
             hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
-            plan = self._look(context, speed, None, search._replace(hopeless=hopeless), judged)
+            search = SEARCH._replace(grid=grid, hopeless=hopeless)
+            plan = self._look(context, speed, None, search, judged)
             if plan.excess <= o.cheap and plan.cost <= dearest and plan.price < price:
                 if plan.excess <= _BEARABLE:
-                    return self._begin(plan, z, wanted)
+                    return plan, None
                 next_best, price = plan, plan.price
             if plan.cost < (np.inf if cheapest is None else cheapest.cost):
                 cheapest = plan
-        if next_best is not None:
-            return self._begin(next_best, z, wanted)
-        # No plan is cheap: the search's step, or the cheapest plan's if that is better.
-        speed = min(max(self._spacing * round(float(z[0]) / self._spacing), low), high)
-        decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
-        if decision.lasting or cheapest is None:
-            self._lead_to(float(self._lqr.gait.vlo[0]))
-            return replace(decision, nominal=False, accepted=self._speed)
-        return replace(self._begin(cheapest, z, wanted), nominal=False)
+        return next_best, cheapest
 
     def _towards(self, z: Array, aim: float) -> Iterator[tuple[float, SpeedChange]]:
         """Changes of speed that may lead from a VLO state near a speed [m/s], and where they lead.

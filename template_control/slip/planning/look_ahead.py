@@ -80,10 +80,8 @@ _KNEE_TOLERANCE = 0.05  # share of the knee moment beyond that costs 1
 SMALL = np.array([0.03, 0.003, 0.04])
 """Changes of a state over which a step is to be nearly linear, for the reference."""
 _LENGTH = 0.004  # of a leg's reach, by which a knee's moment changes by about as much as costs 1
-SEARCH = Search(rounds=8, close=0.03, grid=0, save=0.02, damping=1e-3)
-"""Gauss-Newton steps of a plan."""
-FROM_GRID = SEARCH._replace(grid=3, gridded=CONTROLS)
-"""The same, from other controls of the first step where the template does not complete that one."""
+SEARCH = Search(rounds=8, close=0.03, grid=0, gridded=CONTROLS, save=0.02, damping=1e-3)
+"""Gauss-Newton steps of a plan; a grid is one of its first step."""
 
 
 class Reference(NamedTuple):

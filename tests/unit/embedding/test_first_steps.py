@@ -9,7 +9,6 @@ from template_control.embedding.planners.ahead import AheadPlanner
 from template_control.embedding.planners.planner import Context
 from template_control.slip.automaton.vocabulary import Outcome
 from template_control.slip.maps.return_map import ReturnMap
-from template_control.slip.planning.look_ahead import SEARCH
 
 P = tc.SlipParameters()
 
@@ -31,7 +30,7 @@ def test_more_states_come_back_with_a_grid_of_first_steps(monkeypatch):
     rng = np.random.default_rng(1)
     states = slow.gait.vlo + rng.uniform([-0.5, -0.04, -0.3], [0.5, 0.02, 0.3], (60, 3))
     back = [comes_back(slow, z) for z in states]
-    monkeypatch.setattr(ahead, "FROM_GRID", SEARCH._replace())
+    monkeypatch.setattr(ahead, "_GRID", 0)
     without = [comes_back(slow, z) for z in states]
     assert sum(back) > sum(without)
     assert sum(back) >= 57
