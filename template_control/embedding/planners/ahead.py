@@ -118,11 +118,7 @@ class _Plan(NamedTuple):
     first: tuple[Array, float]  # controls of its first step, as of :func:`.step_controls`
     end: Array  # (3,) of its first step
     changes: bool  # its speed, from one gait to another one, and is not yet in its last step
-
-    @property
-    def price(self) -> float:
-        """Cost with that of a rough step."""
-        return self.cost + self.roughness**2
+    price: float  # cost with that of a rough step
 
 
 class AheadPlanner(Planner):
@@ -217,7 +213,7 @@ class AheadPlanner(Planner):
         wanted, (low, high) = self._speed if target is None else float(target[0]), self.speeds
         aim, cheapest = float(np.clip(wanted, *self.limits.speeds)), None
         for grid in (0, _GRID):
-            best, cheapest = self._best_plan(context, aim, grid)
+            best, cheapest = self._plans(context, aim, grid)
             if best is not None:
                 return self._begin(best, z, wanted)
         # No plan is cheap: the search's step, or the cheapest plan's if that is better.
@@ -228,19 +224,15 @@ class AheadPlanner(Planner):
             return replace(decision, nominal=False, accepted=self._speed)
         return replace(self._begin(cheapest, z, wanted), nominal=False)
 
-    def _best_plan(
-        self, context: Context, aim: float, grid: int
-    ) -> tuple[_Plan | None, _Plan | None]:
-        """The best plan that leads to a speed [m/s], or towards it, of those that are cheap.
+    def _plans(self, context: Context, aim: float, grid: int) -> tuple[_Plan | None, _Plan | None]:
+        """The best of the cheap plans that lead towards a speed [m/s], and the cheapest of others.
 
-        And the cheapest of all those near gaits. None: there is none.
         ``grid`` are points of each control of the first step, see :class:`.Search`.
         """
         z, begun, (low, high), o = context.z, context.decision, self.speeds, self.options
         present = min(max(float(z[0]), low), high)
         change = min(max(aim - present, -o.pace), o.pace)
-        next_best: _Plan | None = None
-        price, effort = np.inf, 0
+        next_best, cheapest, price, effort = None, None, np.inf, 0
         for goal, way in self._towards(z, aim):
             if effort >= _EFFORT:
                 break
@@ -260,7 +252,6 @@ class AheadPlanner(Planner):
             # swing adds for a while. A step goes on to where it went, as long as that is cheap.
             begun_to = aim if begun.accepted is None else begun.accepted
             aims.insert(0, begun_to)
-        cheapest: _Plan | None = None
         dearest = o.dearest or np.inf
         judged = _NEVER if next_best is None else (o.cheap, dearest)
         for speed in aims:
@@ -326,6 +317,7 @@ class AheadPlanner(Planner):
             first=(x[:CONTROLS], float(stiffness[0])),
             end=p.ends[0].copy(),
             changes=change is not None and steps > 1,
+            price=float(cost + error**2),
         )
 
     def _begin(self, plan: _Plan, z: Array, wanted: float) -> Decision:
