@@ -211,11 +211,12 @@ class AheadPlanner(Planner):
         """
         z, target, angles, *_ = context
         wanted, (low, high) = self._speed if target is None else float(target[0]), self.speeds
-        aim, cheapest = float(np.clip(wanted, *self.limits.speeds)), None
-        for grid in (0, _GRID):
-            best, cheapest = self._plans(context, aim, grid)
-            if best is not None:
-                return self._begin(best, z, wanted)
+        aim = float(np.clip(wanted, *self.limits.speeds))
+        best, cheapest = self._plans(context, aim, 0)
+        if best is None:
+            best, _ = self._plans(context, aim, _GRID)
+        if best is not None:
+            return self._begin(best, z, wanted)
         # No plan is cheap: the search's step, or the cheapest plan's if that is better.
         speed = min(max(self._spacing * round(float(z[0]) / self._spacing), low), high)
         decision = self._lqr.decide(Context(z, np.array([speed, 0.0, 0.0]), angles))
