@@ -33,7 +33,7 @@ def test_more_states_come_back_with_a_grid_of_first_steps(monkeypatch):
     monkeypatch.setattr(ahead, "_GRID", 0)
     without = [comes_back(slow, z) for z in states]
     assert sum(back) > sum(without)
-    assert sum(back) >= 57
+    assert sum(back) >= 0.9 * len(states)
 
 
 def test_a_state_in_which_no_usual_step_is_completed_has_a_plan():
