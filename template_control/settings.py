@@ -15,7 +15,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import MISSING, Field, fields, is_dataclass, replace
+from dataclasses import MISSING, fields, is_dataclass, replace
 from datetime import date, time
 from enum import Enum
 from functools import cache
@@ -27,7 +27,7 @@ from typing import Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origi
 import numpy as np
 import tomli_w
 
-from template_control.checks.checked import is_default
+from template_control.checks.checked import default_of, is_default
 from template_control.checks.fitting import unaliased
 from template_control.errors import ParameterError, TemplateControlError, meant
 
@@ -92,7 +92,7 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         if name not in known:
             raise _unknown(place, name, known)
         if isinstance(value, dict) and not isinstance(value, _Keys):
-            usual = _usual_kind(known[name])
+            usual = getattr(default_of(known[name]), _KIND, None)
             if is_dataclass(getattr(preset, name, None)):
                 value = _Keys(getattr(preset, name), value)
             elif usual is not None:
@@ -104,7 +104,7 @@ def from_table(kind: type[T], table: Any, where: str = "") -> T:
         shared = [(f, getattr(base, f.name)) for f in fields(base) if f.name in known]
         values = {f.name: value for f, value in shared if not is_default(f, value)} | values
     for name, f in known.items():
-        if name not in values and f.default is MISSING and f.default_factory is MISSING:
+        if name not in values and default_of(f) is MISSING:
             raise ParameterError(f"{where or 'the table'} has no {name}: give one")
     return _made(lambda: kind(**values), kind, where)
 
@@ -117,8 +117,7 @@ def _preset(kind: Any, base: Any, table: Mapping[str, Any], where: str) -> Any:
     if base is None:
         return found
     usual = kind.of_kind(base.kind)
-    names = [f.name for f in fields(base) if f.name != _KIND]
-    own = {name: getattr(base, name) for name in names}
+    own = {f.name: getattr(base, f.name) for f in fields(base)}
     return replace(found, **{k: v for k, v in own.items() if v != getattr(usual, k)})
 
 
@@ -145,12 +144,6 @@ def _by_name(kind: Any, table: Mapping[str, Any], where: str) -> dict[str, tuple
 def _unknown(place: str, name: str, known: Iterable[str]) -> ParameterError:
     near = meant(name, known)
     return ParameterError(f"unknown key {place}{near}: known are {', '.join(known)}")
-
-
-def _usual_kind(f: Field[Any]) -> str | None:
-    """Kind of the table that is a field's default, such as the world's engine that is installed."""
-    default = f.default if f.default_factory is MISSING else f.default_factory()
-    return getattr(default, _KIND, None) if is_dataclass(default) else None
 
 
 def _made(make: Callable[[], T], kind: type, where: str) -> T:
@@ -218,9 +211,7 @@ def _read(hint: Any, value: Any, where: str) -> Any:
             raise ParameterError(f"{where} is {value!r}: give {_SCALARS[hint]}")
         return hint(value)
     if origin is Literal:
-        if value not in arguments:
-            raise ParameterError(f"{where} is {value!r}: give one of {', '.join(arguments)}")
-        return value
+        return _chosen({word: word for word in arguments}, value, where)
     if origin is tuple:
         return _read_tuple(arguments, value, where)
     if origin is np.ndarray:
@@ -229,10 +220,7 @@ def _read(hint: Any, value: Any, where: str) -> Any:
         except (TypeError, ValueError):
             raise ParameterError(f"{where} is {value!r}: give a list of numbers") from None
     if isinstance(hint, type) and issubclass(hint, Enum):
-        names = {member.name.lower(): member for member in hint}
-        if value not in names:
-            raise ParameterError(f"{where} is {value!r}: give one of {', '.join(names)}")
-        return names[value]
+        return _chosen({member.name.lower(): member for member in hint}, value, where)
     if isinstance(origin, type) and issubclass(origin, Mapping) and arguments[0] is str:
         if not isinstance(value, dict):
             raise ParameterError(f"{where} is {value!r}: give a table")
@@ -260,9 +248,14 @@ def _read_one_of(hints: list[Any], value: Any, where: str) -> Any:
     if not isinstance(value, dict):
         raise ParameterError(f"{where} is {value!r}: give a table")
     wanted = value.get(_KIND, next(iter(kinds)))
-    if wanted not in kinds:
-        raise ParameterError(f"{where}.{_KIND} is {wanted!r}: give one of {', '.join(kinds)}")
-    return from_table(kinds[wanted], value, where)
+    return from_table(_chosen(kinds, wanted, f"{where}.{_KIND}"), value, where)
+
+
+def _chosen(known: Mapping[str, T], word: Any, where: str) -> T:
+    """What a word stands for."""
+    if word not in list(known):  # which may be a list, too
+        raise ParameterError(f"{where} is {word!r}: give one of {', '.join(known)}")
+    return known[word]
 
 
 def _read_tuple(hints: tuple[Any, ...], value: Any, where: str) -> tuple[Any, ...]:
@@ -303,14 +296,13 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
         if tables:
             kinds = _kinds(tables)
             if kinds:
-                usual = _usual_kind(f) or next(iter(kinds))
-                about = f"one of {', '.join(kinds)}"
-                found.setdefault(f"{place}.{_KIND}", Leaf(f"{place}.{_KIND}", str, usual, about))
+                path, usual = f"{place}.{_KIND}", getattr(default_of(f), _KIND, next(iter(kinds)))
+                found[path] = Leaf(path, str, usual, f"one of {', '.join(kinds)}")
             for table in kinds.values() or tables:
                 for leaf in leaves(table, place):
                     found.setdefault(leaf.path, leaf)
         elif _said(hint):
-            default = f.default if f.default_factory is MISSING else f.default_factory()
+            default = default_of(f)
             default, about = None if default is MISSING else default, abouts.get(f.name, "")
             found.setdefault(place, Leaf(place, hint, default, about))
     return iter(found.values())

@@ -81,11 +81,14 @@ def _same(value: Any, other: Any) -> bool:
     return value is other or bool(value == other)
 
 
+def default_of(f: Field[Any]) -> Any:
+    """Default of a dataclass field; ``dataclasses.MISSING`` where it has none."""
+    return f.default if f.default_factory is MISSING else f.default_factory()
+
+
 def is_default(f: Field[Any], value: Any) -> bool:
     """True if the value of a dataclass field is its default."""
-    if f.default_factory is not MISSING:
-        return _same(value, f.default_factory())
-    return f.default is not MISSING and _same(value, f.default)
+    return _same(value, default_of(f))
 
 
 @cache
