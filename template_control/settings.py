@@ -297,7 +297,7 @@ def leaves(kind: Any, where: str = "") -> Iterator[Leaf]:
             kinds = _kinds(tables)
             if kinds:
                 path, usual = f"{place}.{_KIND}", getattr(default_of(f), _KIND, next(iter(kinds)))
-                found[path] = Leaf(path, str, usual, f"one of {', '.join(kinds)}")
+                found[path] = Leaf(path, Literal[*kinds], usual, f"one of {', '.join(kinds)}")
             for table in kinds.values() or tables:
                 for leaf in leaves(table, place):
                     found.setdefault(leaf.path, leaf)

@@ -23,7 +23,6 @@ from template_control.robustness.campaign import (
     run_campaign,
     save_falls,
 )
-from template_control.run.experiment import Experiment
 from template_control.run.specs import GaitSpec
 from template_control.storage import Files, write_text, writing
 from template_control.view.trial_figures import campaign_figure
@@ -78,7 +77,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run the trials as the options say; returns 0, or 130 after Ctrl-C."""
-    experiment = experiment_from(options, Experiment())
+    experiment = experiment_from(options)
     default = FLOATING_MIX if experiment.free else DisturbanceDistribution()
     mix = default if options.mix is None else settings.read(DisturbanceDistribution, options.mix)
     conditions = CampaignConfig(experiment, mix.times(options.severity), options.draws)

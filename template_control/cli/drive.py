@@ -9,7 +9,6 @@ from pathlib import Path
 from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import MASSES, OWN_URDF, ROBOT, WORLD
-from template_control.run.experiment import Experiment
 from template_control.view.browser import PORTS
 from template_control.view.live.drive import FPS, drive
 from template_control.view.replay.playback import FRAME_RATES
@@ -44,7 +43,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Serve the page until Ctrl-C."""
-    e = experiment_from(options, Experiment())
+    e = experiment_from(options)
     e = replace(e, motion=None, planner=None, steps=None, pushes=(), frictions=())
     drive(
         replace(e, start=None, seed=None, pose=None),

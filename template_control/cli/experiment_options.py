@@ -10,10 +10,10 @@ import argparse
 import tomllib
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 from template_control.checks import option_types as values
-from template_control.cli.flags import ALL, GAIT, LEAVES, OWN_URDF, PLANNERS, STANDS, Flag
+from template_control.cli.flags import ALL, GAIT, LEAVES, OWN_URDF, PERTURBED, STANDS, Flag
 from template_control.embedding.options import KINDS
 from template_control.embedding.planners.ahead import AheadOptions
 from template_control.embedding.planners.lqr import LqrOptions
@@ -22,10 +22,11 @@ from template_control.errors import ParameterError
 from template_control.plant.bullet import PlantOptions
 from template_control.robot.spec import RobotSpec
 from template_control.run.experiment import Experiment
-from template_control.run.specs import OwnPlanner
+from template_control.run.specs import OwnPlanner, PlannerSpec
 from template_control.slip.scenario.scenario import Scenario
 
 _LONG, _THIN = 200, 5  # steps beyond which by default every 5th sample is kept
+_PLANNERS = {options.kind: options for options in get_args(PlannerSpec) if options != OwnPlanner}
 
 
 def add_flags(parser: argparse.ArgumentParser, flags: Sequence[Flag]) -> None:
@@ -62,35 +63,34 @@ class _Key(argparse.Action):
         namespace.keys = keys
 
 
-def experiment_from(options: argparse.Namespace, default: Experiment) -> Experiment:
+def experiment_from(options: argparse.Namespace, default: Experiment | None = None) -> Experiment:
     """The experiment that was asked for; ``default`` holds where nothing says otherwise."""
-    base = default if options.config is None else Experiment.load(options.config)
+    base = default or Experiment()
+    if options.config is not None:
+        base = Experiment.load(options.config)
     given: dict[str, Any] = {}
     for flag in ALL:
         value = getattr(options, flag.dest, None)
         if value is not None:
             found = value if flag.read is None else flag.read(value)
             given |= dict.fromkeys(flag.keys.split(), found)
-    _check_motion(base, options, given)
+    _check_motion(base, given)
     typed_keys: dict[str, Any] = options.keys or {}
     first = ("robot", "motion", "world.kind", "sensors.kind")
-    head = {k: v for k, v in given.items() if k.startswith(first)}
-    base = base.with_(head | {k: v for k, v in typed_keys.items() if k.startswith(first)})
+    head = {k: v for k, v in (given | typed_keys).items() if k.startswith(first)}
+    base = base.with_(head)
     rest = {k: v for k, v in given.items() if k not in head}
     _complete(base, options, rest)
-    rest |= {k: v for k, v in typed_keys.items() if not k.startswith(first)}
-    return base.with_(rest)
+    return base.with_(rest | {k: v for k, v in typed_keys.items() if k not in head})
 
 
-def _check_motion(base: Experiment, options: argparse.Namespace, given: dict[str, Any]) -> None:
+def _check_motion(base: Experiment, given: dict[str, Any]) -> None:
     """Refuse a gait's option where there is a scenario."""
     if isinstance(given.get("motion", base.motion), Scenario):
-        for flag in (*GAIT, *STANDS):
-            if getattr(options, flag.dest, None) is not None:
+        for flag in (*GAIT, *STANDS, PERTURBED):
+            if flag.keys in given:
                 hint = ": give it segments that stand" if flag in STANDS else ": leave one out"
                 raise ParameterError(f"{flag.names} does not go with a scenario{hint}")
-        if "seed" in given:
-            raise ParameterError("--seed does not go with a scenario: leave one out")
 
 
 def _complete(base: Experiment, options: argparse.Namespace, given: dict[str, Any]) -> None:
@@ -131,13 +131,13 @@ def _complete(base: Experiment, options: argparse.Namespace, given: dict[str, An
 
 def _planner(name: str, base: Experiment) -> Any:
     """Options of a planner by its name; of the same one as before those that it had."""
-    if name not in PLANNERS:
+    if name not in _PLANNERS:
         if ":" not in name:
             raise ParameterError(
-                f"--planner is {name!r}: give {', '.join(PLANNERS)} or module:Class"
+                f"--planner is {name!r}: give {', '.join(_PLANNERS)} or module:Class"
             )
         return OwnPlanner(name)
     if getattr(base.planner, "kind", None) == name:
         return base.planner
     own = KINDS[base.tuning.kind]
-    return {LqrOptions.kind: own.lqr, AheadOptions.kind: own.ahead}.get(name) or PLANNERS[name]()
+    return {LqrOptions.kind: own.lqr, AheadOptions.kind: own.ahead}.get(name) or _PLANNERS[name]()

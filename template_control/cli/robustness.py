@@ -11,7 +11,6 @@ from template_control.cli.trial_options import Report, add_trial_options, folder
 from template_control.robustness.disturbances import AFTER, ALL
 from template_control.robustness.findings import Finding, Robustness
 from template_control.robustness.severity_sweep import SETTLED, measure
-from template_control.run.experiment import Experiment
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.storage import writing
 from template_control.view.trial_figures import robustness_figure
@@ -60,7 +59,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Measure as the options say; returns 0, or 130 after Ctrl-C."""
-    experiment = experiment_from(options, Experiment())
+    experiment = experiment_from(options)
     where = experiment.prepare()  # before a folder is made for it
     with writing(folder_of(options, experiment, "runs/robustness", where.robot.name)) as folder:
         return report_trials(
