@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 import types
+from argparse import ArgumentTypeError
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import Enum
 from functools import cache, partial
@@ -59,6 +60,14 @@ def unaliased(hint: Any) -> Any:
     return value[arguments] if arguments else value
 
 
+_WORDS: dict[Any, str] = {
+    float: Range().words("number"),
+    int: Range().words("whole number"),
+    **dict.fromkeys((list, Sequence), "a list"),
+    **dict.fromkeys((dict, Mapping), "a mapping"),
+}
+
+
 def words_for(hint: Any) -> str:
     """Words for what fits an annotation, for a message."""
     hint = unaliased(hint)
@@ -81,22 +90,16 @@ def words_for(hint: Any) -> str:
         if len(each) == 1:
             return f"{len(args)} times {each[0]}"
         return ", ".join(each)
-    if origin in (list, Sequence):
-        return "a list"
-    if origin in (Mapping, dict):
-        return "a mapping"
-    if hint is float:
-        return Range().words("number")
-    if hint is int:
-        return "a whole number"
+    if (origin or hint) in _WORDS:
+        return _WORDS[origin or hint]
     if isinstance(hint, type) and issubclass(hint, Enum):
         return f"a {hint.__name__}: " + ", ".join(str(member) for member in hint)
     name = getattr(hint, "__name__", str(hint))
     return f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"
 
 
-class Refused(Exception):
-    """A value does not fit; its text says what would."""
+class Refused(ArgumentTypeError):
+    """A value does not fit; its text, which ``argparse`` shows, says what would."""
 
 
 def check(

@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from template_control.checks.fitting import Refused
 from template_control.checks.ranges import Range
 from template_control.checks.typed import parsed
 
@@ -20,12 +19,12 @@ MANY = Range(1, 1_000_000)  # of things that are simulated or drawn one by one
 
 def number(within: Range) -> Callable[[str], float]:
     """The ``type`` of an option that is a number in a range, in the unit that the user types."""
-    return partial(_read, hint=Annotated[float, within])
+    return partial(parsed, hint=Annotated[float, within])
 
 
 def whole(within: Range) -> Callable[[str], int]:
     """Reader of a whole number; see :func:`number`."""
-    return partial(_read, hint=Annotated[int, within])
+    return partial(parsed, hint=Annotated[int, within])
 
 
 def path(text: str) -> Path:
@@ -45,10 +44,3 @@ def add_folder(parser: argparse.ArgumentParser, folder: str, about: str) -> None
     """Add ``--output``, by default ``folder``, and ``--no-figures``."""
     parser.add_argument("--output", type=path, default=Path(folder), help=about)
     parser.add_argument("--no-figures", action="store_true", help="do not draw figures")
-
-
-def _read(text: str, hint: Any) -> Any:
-    try:
-        return parsed(text, hint)
-    except Refused as refused:
-        raise argparse.ArgumentTypeError(str(refused)) from None
