@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import importlib
 import warnings
 from collections.abc import Callable
+from pkgutil import resolve_name
 
 import lazy_loader
 
@@ -78,8 +78,8 @@ def attach_stub(
         old = f"{package}.{name}"
         if old not in DEPRECATED:
             return attribute(name)
-        home, _, new = DEPRECATED[old].partition(":")
-        warnings.warn(f"{old} is deprecated: use {home}.{new}", DeprecationWarning, stacklevel=2)
-        return getattr(importlib.import_module(home), new)
+        new = DEPRECATED[old].replace(":", ".")
+        warnings.warn(f"{old} is deprecated: use {new}", DeprecationWarning, stacklevel=2)
+        return resolve_name(DEPRECATED[old])
 
     return attribute_or_deprecated, directory, names

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import gc
-import importlib
 import io
 import logging
 import os
@@ -12,17 +11,10 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from pkgutil import resolve_name
 from typing import Any, NoReturn
 
-from template_control.cli.interrupts import (
-    INTERRUPTED,
-    end_at_once,
-    end_quietly,
-    insist,
-    interrupt,
-    on_signals,
-    stopped,
-)
+from template_control.cli import interrupts
 from template_control.cli.notices import notice, printed
 from template_control.errors import ParameterError, TemplateControlError, meant
 
@@ -47,14 +39,14 @@ _COMMANDS = {
 }
 """Commands, with a line about each."""
 
-# The module with a command's ``add_options(parser)`` and ``run(options)``, after a colon the object
-# of the module that has them; of the other commands the one of their name.
+# The module with a command's ``add_options(parser)`` and ``run(options)``, or after the colon the
+# object of the module that has them; of the other commands the module of their name.
 _PLACES = {
     "walk": "cli.motion:WALK",
     "run": "cli.motion:RUN",
     "go": "cli.motion:GO",
-    "warm-up": "cli.warm_up",
-    "reproduce": "paper.command",
+    "warm-up": "cli.warm_up:",
+    "reproduce": "paper.command:",
 }
 _USER_ERROR = 2
 _STDOUT, _STDERR = 1, 2
@@ -115,9 +107,7 @@ def build_parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentPar
     for name, about in _COMMANDS.items():
         sub_parser = commands.add_parser(name, help=about)
         if arguments is None or name in named:
-            module, _, part = _PLACES.get(name, f"cli.{name}").partition(":")
-            found: Any = importlib.import_module(f"template_control.{module}")
-            found = getattr(found, part) if part else found
+            found = resolve_name(f"template_control.{_PLACES.get(name, f'cli.{name}:')}")
             found.add_options(sub_parser)
             sub_parser.set_defaults(run=found.run)
     return parser
@@ -132,18 +122,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments is not None:
         return _command(arguments)
     output = _standard_streams()
-    on_signals(end_at_once)
-    insist()
+    interrupts.on_signals(interrupts.end_at_once)
+    interrupts.insist()
     gc.disable()  # what is imported stays: to look through it, now and at the end, takes a quarter
     try:
         status = _command(sys.argv[1:], output)
-        if stopped():
+        if interrupts.stopped():
             with suppress(OSError):
                 sys.stdout.flush()
             os._exit(status)  # to take everything apart takes Python up to a second
         return status
     finally:
-        on_signals(end_quietly)
+        interrupts.on_signals(interrupts.end_quietly)
 
 
 def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
@@ -153,20 +143,20 @@ def _command(arguments: Sequence[str], output: _Standard | None = None) -> int:
         if output is not None:
             gc.freeze()
             gc.enable()
-            on_signals(interrupt)
+            interrupts.on_signals(interrupts.interrupt)
         with printed(logging.getLogger("template_control.robot")):  # such as missing meshes
             status = int(options.run(options))
         sys.stdout.flush()
         return status
     except KeyboardInterrupt as error:
         if output is not None:
-            on_signals(end_quietly)
-        line, status = str(error) or _NOTHING_KEPT, INTERRUPTED
+            interrupts.on_signals(interrupts.end_quietly)
+        line, status = str(error) or _NOTHING_KEPT, interrupts.INTERRUPTED
     except TemplateControlError as error:
         line, status = str(error), _USER_ERROR
     except (Exception, SystemExit):
-        if stopped():  # an import that Ctrl-C ends may end with any error
-            line, status = _NOTHING_KEPT, INTERRUPTED
+        if interrupts.stopped():  # an import that Ctrl-C ends may end with any error
+            line, status = _NOTHING_KEPT, interrupts.INTERRUPTED
         else:
             with suppress(OSError):
                 sys.stdout.flush()

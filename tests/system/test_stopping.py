@@ -180,7 +180,7 @@ def run(_):
 stub = types.ModuleType("stub")
 stub.add_options, stub.run = lambda parser: None, run
 sys.modules["template_control.stub"] = stub
-main._PLACES["walk"] = "stub"
+main._PLACES["walk"] = "stub:"
 sys.argv = ["template-control", "walk"]
 sys.exit(main.main())
 """
