@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from template_control.checks import option_types as values
 from template_control.cli.experiment_options import add_flags, experiment_from
@@ -15,8 +14,8 @@ from template_control.cli.report import (
     NO_STANDS,
     add_output_options,
     add_template,
-    print_table,
     run_and_keep,
+    tables,
 )
 from template_control.errors import ParameterError
 from template_control.run.experiment import Experiment
@@ -28,7 +27,7 @@ from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.storage import Files
-from template_control.terminal import plain_console
+from template_control.terminal import plain_console, report
 from template_control.warm_up import ready
 
 _KEPT = (
@@ -40,7 +39,7 @@ _KEPT = (
 
 @dataclass(frozen=True)
 class Motion:
-    """A command that runs an experiment, by default ``default``.
+    """A command that runs an experiment; ``default`` is of :func:`experiment_from`.
 
     ``doing`` is in front of the progress bar, ``about`` begins the description; ``template`` says
     whether a scenario, named without a flag, is simulated on the template too.
@@ -48,7 +47,7 @@ class Motion:
 
     doing: str
     about: str
-    default: Experiment = field(default_factory=Experiment)
+    default: Experiment | None = None
     template: bool = False
 
     def add_options(self, parser: argparse.ArgumentParser) -> None:
@@ -77,10 +76,7 @@ class Motion:
         figures = summarise(record, path)
         if template is not None:
             add_template(figures, record, template)
-        if options.json:
-            print(json.dumps(figures))
-        else:
-            print_table(figures)
+        report(options.json, figures, *tables(figures))
         files.raise_pending()
         if record.interrupted:
             notice(f"interrupted: the run up to here is in {path}")

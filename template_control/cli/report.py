@@ -24,7 +24,7 @@ from template_control.run.simulation import simulate
 from template_control.run.summary import rms
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
-from template_control.terminal import figures_table, progress_bar, show, table
+from template_control.terminal import figures_table, progress_bar, table
 
 
 def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
@@ -103,10 +103,10 @@ _UNCONTROLLED = 0.1  # of the ticks without a solved QP; a stumble has a few
 _MEAN = 50  # strides at most whose section states the summary averages
 
 
-def print_table(figures: dict[str, Any]) -> None:
-    """The summary, from :func:`~template_control.run.summary.summarise`, as a table on stdout."""
+def tables(figures: dict[str, Any]) -> tuple[Table, Table]:
+    """The summary, from :func:`~template_control.run.summary.summarise`, and what joints did."""
     title = f"{figures['robot']}, gait {figures['gait']}"
-    show(figures_table(title, _rows(figures)), joint_table(figures))
+    return figures_table(title, _rows(figures)), joint_table(figures)
 
 
 def _rows(figures: dict[str, Any]) -> Iterator[tuple[str, str]]:

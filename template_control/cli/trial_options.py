@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -13,6 +12,7 @@ from typing import Any, TypeVar
 
 from matplotlib.figure import Figure
 
+from template_control import terminal
 from template_control.checks import option_types as values
 from template_control.checks.ranges import Range
 from template_control.cli.interrupts import INTERRUPTED
@@ -23,7 +23,7 @@ from template_control.run.experiment import Experiment
 from template_control.run.specs import GaitSpec
 from template_control.storage import Files
 from template_control.sweep.executor import workers
-from template_control.terminal import show, table
+from template_control.terminal import table
 from template_control.view.style import figure_style, save_figure
 
 T = TypeVar("T")
@@ -101,16 +101,15 @@ def report_trials(
     files = Files()
     made = report(found, files)
     figure = files.write(lambda: _draw(made.figure, folder / made.name))
-    if options.json:
-        print(json.dumps({**made.data, "figure": None if figure is None else str(figure)}))
-    elif options.markdown:
+    data = {**made.data, "figure": None if figure is None else str(figure)}
+    shown = [table(made.title, made.columns, made.rows, left=len(made.columns))]
+    if made.details is not None:
+        shown.append(table(*made.details, left=len(made.details[1])))
+    lines = filter(None, (made.note, "" if figure is None else f"figure: {figure}"))
+    if options.markdown:
         print(made.markdown())
     else:
-        shown = [table(made.title, made.columns, made.rows, left=len(made.columns))]
-        if made.details is not None:
-            shown.append(table(*made.details, left=len(made.details[1])))
-        lines = (made.note, "" if figure is None else f"figure: {figure}")
-        show(*shown, lines=filter(None, lines))
+        terminal.report(options.json, data, *shown, lines=lines)
     files.raise_pending()
     return 0
 

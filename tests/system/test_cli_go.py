@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from template_control.cli.main import main
-from template_control.cli.report import add_template, print_table
+from template_control.cli.report import add_template, tables
 from template_control.run.record import Record
 from template_control.run.summary import summarise
 from template_control.slip.scenario.run import ScenarioRecord
+from template_control.terminal import show
 
 KEYS = {
     "robot", "completed", "fell", "fall_reason", "duration", "top_speed", "speed_error_rms",
@@ -109,7 +110,7 @@ def test_where_the_nearest_speed_was_taken_is_told(record, template, capfd):
     target[3, 0] = record.section_predicted[3, 0] + 0.5  # further than a running stride leads
     figures = summarised(replace(record, section_target=target), template)
     assert figures["nearest_speed_taken"] == {"strides": 1, "most": pytest.approx(0.5)}
-    print_table(figures)
+    show(*tables(figures))
     assert "1 times, 0.50 m/s off" in capfd.readouterr().out
 
 

@@ -6,10 +6,11 @@ import pytest
 
 import template_control as tc
 from template_control.cli.main import main
-from template_control.cli.report import print_table
+from template_control.cli.report import tables
 from template_control.slip.gaits.running_gait import running_gait
 from template_control.slip.scenario.run import simulate_scenario
 from template_control.slip.scenario.scenario import Scenario, Segment
+from template_control.terminal import show
 from template_control.view import save_scenario_figures
 from template_control.view.figures import FIGURES, figures_of
 
@@ -32,7 +33,7 @@ def test_a_scenario_s_name_is_printed_as_it_is(name, tmp_path, capsys):
 @pytest.mark.parametrize("name", NAMES)
 def test_a_robot_s_name_is_printed_as_it_is(name, short_walk, capsys):
     figures = tc.run.summarise(renamed(short_walk, name), f"{name}.npz")
-    print_table(figures)
+    show(*tables(figures))
     out = capsys.readouterr().out
     assert f"{name}, gait walk" in out
     assert f"{name}.npz" in out
