@@ -85,7 +85,10 @@ def _digest() -> str:
     They are the modules with compiled functions, and what they import, whose constants are frozen
     into the code.
     """
-    contents = {_module(path): path.read_bytes() for path in _PACKAGE.rglob("*.py")}
+    contents = {}
+    for path in _PACKAGE.rglob("*.py"):
+        name = ".".join(path.relative_to(_PACKAGE.parent).with_suffix("").parts)
+        contents[name.removesuffix(".__init__")] = path.read_bytes()
     found: set[str] = set()
     waiting = [n for n, text in contents.items() if __name__ in _imported(text)]
     while waiting:
@@ -97,12 +100,6 @@ def _digest() -> str:
     for name in sorted(found):
         digest.update(f"{name} {len(contents[name])}\n".encode() + contents[name])
     return digest.hexdigest()[:16]
-
-
-def _module(path: Path) -> str:
-    """Dotted name of a module of the package."""
-    parts = path.relative_to(_PACKAGE.parent).with_suffix("").parts
-    return ".".join(part for part in parts if part != "__init__")
 
 
 def _imported(source: bytes) -> list[str]:

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import gc
-import importlib
 import logging
 import os
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import NamedTuple
 
 from template_control.compiled import cache_folder
@@ -70,20 +70,13 @@ def ready(parts: Sequence[Part]) -> None:
     """
     wanted = [part for part in parts if part not in _READY]
     missing = [part for part in wanted if not part.done]
-    with _uncollected():
+    collects = gc.isenabled()
+    gc.disable()  # Numba's many objects would cost Python's collector a fifth of the time
+    try:
         _compile(missing)
         for part in wanted:
             part.compile()
             _READY.add(part)
-
-
-@contextmanager
-def _uncollected() -> Iterator[None]:
-    """Python's collector at rest: Numba's many objects would cost it a fifth of the time."""
-    collects = gc.isenabled()
-    gc.disable()
-    try:
-        yield
     finally:
         if collects:
             gc.enable()
@@ -186,8 +179,7 @@ def _help(names: Sequence[str]) -> None:
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
     gc.disable()  # this process ends before it is worth it
     for name in names:
-        module, _, function = name.partition(":")
-        Part(getattr(importlib.import_module(module), function), 0.0).compile()
+        Part(resolve_name(name), 0.0).compile()
 
 
 if __name__ == "__main__":

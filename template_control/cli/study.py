@@ -39,18 +39,16 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _report(study: Study, result: SweepResult, name: str) -> Report:
-    rows, data = [], []
+    rows, data, failed = [], [], any(result.errors)
     for item, found, error in zip(result.items, result.results, result.errors, strict=True):
         keys = item["item"]
         figures = [_text(found[figure]) if found else "" for figure in study.figures]
-        rows.append([*map(_text, keys.values()), *figures, error or ""])
+        rows.append([*map(_text, keys.values()), *figures, *[error or ""] * failed])
         data.append({"keys": keys, "figures": found, "error": error})
-    failed = any(result.errors)
-    columns = [*study.axes, *study.figures, *["why not"] * failed]
     return Report(
         title=study.about or name,
-        columns=columns,
-        rows=[row[: len(columns)] for row in rows],
+        columns=[*study.axes, *study.figures, *["why not"] * failed],
+        rows=rows,
         data={"about": study.about, "trials": data},
         figure=lambda: study_figure(study, result),
         name="figure.png",
