@@ -10,13 +10,8 @@ from template_control.cli.experiment_options import add_flags, experiment_from
 from template_control.cli.flags import ALL, SCENARIO
 from template_control.cli.interrupts import INTERRUPTED
 from template_control.cli.notices import notice
-from template_control.cli.report import (
-    NO_STANDS,
-    add_output_options,
-    add_template,
-    run_and_keep,
-    tables,
-)
+from template_control.cli.plots import add_figure_options
+from template_control.cli.report import NO_STANDS, add_template, run_and_keep, tables
 from template_control.errors import ParameterError
 from template_control.run.experiment import Experiment
 from template_control.run.live import COMPILED
@@ -63,7 +58,14 @@ class Motion:
                 help="the scenario, such as examples/example_one.toml; not needed with --config",
             )
         add_flags(parser, flags)
-        add_output_options(parser, f"runs/{parser.prog.split()[-1]}")
+        folder = f"runs/{parser.prog.split()[-1]}"
+        about = (
+            f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
+            " there is replaced, and the command says so"
+        )
+        values.add_folder(parser, folder, about)
+        values.add_json(parser)
+        add_figure_options(parser)
 
     def run(self, options: argparse.Namespace) -> int:
         """Do the run; returns 0, 1 after a fall, 130 after Ctrl-C."""

@@ -11,10 +11,9 @@ from typing import Any, NoReturn
 
 from rich.table import Table
 
-from template_control.checks import option_types as values
 from template_control.cli.interrupts import stopped
 from template_control.cli.notices import notice, printed
-from template_control.cli.plots import TEMPLATE, add_figure_options, draw
+from template_control.cli.plots import TEMPLATE, draw
 from template_control.errors import TemplateControlError
 from template_control.plant.c_library import stdout_to_stderr
 from template_control.run.experiment import STEPS, Experiment, PreparedExperiment
@@ -25,17 +24,6 @@ from template_control.run.summary import rms
 from template_control.slip.scenario.run import ScenarioRecord
 from template_control.storage import Files, writing
 from template_control.terminal import figures_table, progress_bar, table
-
-
-def add_output_options(parser: argparse.ArgumentParser, folder: str) -> None:
-    """Add ``--output`` (by default ``folder``), ``--json``, and which figures are drawn."""
-    about = (
-        f"folder for run.npz, run.toml and figures, {folder} if not given; a run that is"
-        " there is replaced, and the command says so"
-    )
-    values.add_folder(parser, folder, about)
-    values.add_json(parser)
-    add_figure_options(parser)
 
 
 @contextmanager
