@@ -36,11 +36,19 @@ def settling_map(a: Array, b: Array, tolerance: Array, control_weight: float) ->
     A (3, 3) and B (3, c) the Jacobians of the VLO map. Without push-off the controls act in two
     directions only, so not every offset can be cancelled with dz = 0.
     """
-    weight = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
-    constraint, n = np.hstack((np.eye(3) - a, -b)), len(weight)
-    kkt = np.zeros((n + 3, n + 3))
-    kkt[:n, :n] = np.diag(weight)
-    kkt[n:, :n] = constraint
-    kkt[:n, n:] = constraint.T
-    solution = np.linalg.solve(kkt, np.vstack((np.zeros((n, 3)), np.eye(3))))
+    weights = np.concatenate((1.0 / tolerance**2, np.full(b.shape[1], control_weight)))
+    constraint = np.hstack((np.eye(3) - a, -b))
+    return least_change(weights, constraint, np.zeros((len(weights), 3)), np.eye(3))
+
+
+def least_change(weights: Array, constraint: Array, pull: Array, missing: Array) -> Array:
+    """The x (n, ...) with the least x' W x / 2 - pull' x, W of ``weights`` (n,), and C x = missing.
+
+    C is the ``constraint`` (m, n).
+    """
+    n, m = len(weights), len(constraint)
+    kkt = np.zeros((n + m, n + m))
+    kkt[:n, :n] = np.diag(weights)
+    kkt[:n, n:], kkt[n:, :n] = constraint.T, constraint
+    solution = np.linalg.solve(kkt, np.concatenate((pull, missing)))
     return np.asarray(solution[:n], dtype=np.float64)

@@ -29,6 +29,7 @@ from template_control.slip.automaton.vocabulary import (
     StrideKind,
     WalkingStride,
 )
+from template_control.slip.control.lqr import least_change
 from template_control.slip.dynamics.stride import Stride, controls, simulate_stride
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO, section_of
@@ -307,9 +308,9 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
     if slope == p.slope:
         return gait
     slots, units = control_units(gait)
-    weights = np.array([_HEIGHT / p.rest_length**2, _RISE / p.speed_unit**2, _ANGLE])
-    weights = np.append(weights, [_STIFFNESS] * (len(slots) - 1))
-    weights = np.append(weights, _ASSIST / p.gravity**2)
+    state = _HEIGHT / p.rest_length**2, _RISE / p.speed_unit**2
+    free = _ANGLE, *[_STIFFNESS] * (len(slots) - 1), _ASSIST / p.gravity**2
+    weights = np.array([*state, *free])
     wanted = np.concatenate((gait.vlo[1:], gait.controls[slots] / units, [p.assist]))
     change = _DIFFERENCE * p.gravity
 
@@ -331,7 +332,7 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
         by_controls = here.control_jacobian[:, slots] * units
         by_assist = (there - here.state)[:, None] / change
         slopes = np.hstack((by_state, by_controls, by_assist))
-        step = _least_change(weights, wanted - x, slopes, z - here.state)
+        step = least_change(weights, slopes, weights * (wanted - x), z - here.state)
         x += step
         if np.max(np.abs(step)) < _DONE:
             z, u, own = unpacked(x)
@@ -342,16 +343,6 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
         f"no walking gait with {gait.vlo[0]:.3g} m/s at VLO on a slope of"
         f" {np.degrees(slope):.3g} deg: take a gentler slope"
     )
-
-
-def _least_change(weights: Array, wanted: Array, slopes: Array, missing: Array) -> Array:
-    """The step s with slopes s = missing and the least weighted distance from ``wanted``."""
-    n, m = len(weights), len(missing)
-    kkt = np.zeros((n + m, n + m))
-    kkt[:n, :n] = np.diag(weights)
-    kkt[:n, n:], kkt[n:, :n] = slopes.T, slopes
-    solution = np.linalg.solve(kkt, np.concatenate((weights * wanted, missing)))
-    return np.asarray(solution[:n], dtype=np.float64)
 
 
 def gait_stride(gait: Gait, automaton: Automaton = AUTOMATON) -> Stride:
