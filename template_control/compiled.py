@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numba
+import numpy as np
 from numba.extending import overload
 
 Function = Callable[..., Any]
@@ -143,6 +144,14 @@ def unfused(function: Any) -> Any:
     code is part of theirs.
     """
     return numba.njit(function.py_func, **_ALLOCATING)
+
+
+def constant(value: int) -> Any:
+    """A constant that compiled functions hand on: a whole number, or a truth value.
+
+    Numba would compile what it is handed to once more for each literal, as Python's constants are.
+    """
+    return np.bool_(value) if isinstance(value, bool) else np.int64(value)
 
 
 def inner_by_type(function: Function) -> Callable[[Function], Any]:

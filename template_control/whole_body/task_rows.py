@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.compiled import compiled
+from template_control.compiled import compiled, constant
 from template_control.robot.terms import MOST_SPARE, UP, onward
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 _PITCH = 2  # place of a planar robot's pitch in q
-# Axes of rows. Numba would compile a callee once more for each literal that it is handed.
-_AHEAD, _SIDE, _UPWARD = np.int64(0), np.int64(1), np.int64(UP)
+_AHEAD, _SIDE, _UPWARD = map(constant, (0, 1, UP))  # axes of rows
 _YAW = 2
 # An error of the yaw counts as this much at most in a run [rad]: more momentum about the vertical
 # than it asks for is more than ab- and adduction have, and roll is lost with it.

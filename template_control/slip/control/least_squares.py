@@ -12,9 +12,9 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.cholesky import cholesky, solve_cholesky
-from template_control.compiled import compiled, compiled_into
+from template_control.compiled import compiled, compiled_into, constant
 
-_NONE = np.int64(0)  # Numba would compile what a literal 0 is handed to for it alone
+_NONE = constant(0)
 _LESS = 0.1  # of the damping, after a step that does as foreseen; after a bad one as much more
 _TINY = 1e-300
 _SOME = 2  # rounds after which the cost says whether others are worth it

@@ -5,8 +5,7 @@ substeps end. Bounds of their second derivatives exclude that one rises in betwe
 it does.
 
 Three kinds of path: ``SERIES`` (the exact kernel's Taylor polynomials), ``STANCE`` (the closed form
-(11) about a pivot) and ``FLIGHT`` (10). The kind is an argument, and no literal: for each literal
-Numba would compile all that it is handed to once more.
+(11) about a pivot) and ``FLIGHT`` (10).
 """
 
 from __future__ import annotations
@@ -16,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, BoolArray, IntArray
-from template_control.compiled import inner
+from template_control.compiled import constant, inner
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 
-SERIES, STANCE, FLIGHT = np.int64(0), np.int64(1), np.int64(2)
+SERIES, STANCE, FLIGHT = map(constant, range(3))
 COEFFICIENTS = 12
 
 _ARMING = 1e-10  # a guard must have been this far below zero before it can fire

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, BoolArray, IntArray
-from template_control.compiled import inner
+from template_control.compiled import constant, inner
 from template_control.slip.automaton.hybrid import Tables
 from template_control.slip.automaton.vocabulary import MAX_EDGES, NUM_EVENTS, Event, Outcome, Reset
 from template_control.slip.dynamics.guards import (
@@ -30,7 +30,7 @@ MAX_SEGMENTS = 96
 MAX_EVENTS = 16
 _SUBSTEPS = 4
 _EVENT_TIME = 1e-14  # [s]
-_EVERY = np.bool_(True)  # Numba would compile the stride once more for a literal True
+_EVERY = constant(True)
 
 
 class Scratch(NamedTuple):

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array
-from template_control.compiled import inner
+from template_control.compiled import constant, inner
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, Event, Reset, Slot
 from template_control.slip.dynamics.guards import SERIES, Path, guard_gradient, sample
 from template_control.slip.dynamics.kernel import Scratch
@@ -29,8 +29,7 @@ COLUMNS = 3 + NUM_SLOTS
 """What a stride is differentiated by: dx/dt, y, dy/dt at its start, then the controls by Slot."""
 
 _INPUTS = 8  # of a phase: x, y, dx/dt, dy/dt, rear and front toe, rear and front stiffness
-# Legs, and a row. Numba would compile a callee once more for each literal that it is handed.
-_REAR, _FRONT, _LANDED = np.int64(0), np.int64(1), np.int64(2)
+_REAR, _FRONT, _LANDED = map(constant, range(3))  # legs, and a row
 _TOE, _KAPPA = 4, 6
 
 

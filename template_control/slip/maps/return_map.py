@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from template_control.arrays import Array, IntArray
 from template_control.checks.checked import checked
-from template_control.compiled import compiled, inner
+from template_control.compiled import compiled, constant, inner
 from template_control.errors import ParameterError
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.hybrid import Automaton
@@ -22,9 +22,8 @@ from template_control.slip.dynamics.tangent import Tangents, new_tangents, strid
 from template_control.slip.maps.section import PADDED, section_of
 from template_control.slip.parameters import SlipParameters
 
-# Numba would compile the stride once more for a literal.
-_LAST_ONLY, _RECORDED = np.bool_(False), np.bool_(True)
-EXACT = np.int64(MapKind.EXACT)
+_LAST_ONLY, _RECORDED = constant(False), constant(True)
+EXACT = constant(MapKind.EXACT)
 """The exact map, for compiled code."""
 _DIFFERENCE = 3e-6  # relative; leaves 1e-11 of the third derivative and 1e-9 of rounding
 
@@ -33,8 +32,8 @@ RESULTS = 9
 leg's at touchdown; of the exact map also the times from the section to the touchdown, and from the
 rear leg's liftoff to the next section [s]."""
 
-REAR_BOTTOM, FRONT_BOTTOM, REAR_TOUCHDOWN = 4, 5, 6
-"""Places of the legs' lengths among them."""
+REAR_BOTTOM, FRONT_BOTTOM = 4, 5
+"""Places of the legs' lengths at the bottom among them."""
 LANDING_TIME, LIFTED_TIME = 7, 8
 """Places of the times."""
 
@@ -326,8 +325,7 @@ class ReturnMap:
         shape = np.broadcast_shapes(states.shape[:-1], inputs.shape[:-1])
         count = int(np.prod(shape, dtype=np.int64))
         full = self.sections[0].padded(np.broadcast_to(states, (*shape, states.shape[-1])))
-        flat_u = np.empty((*shape, NUM_SLOTS))
-        flat_u[...] = inputs
+        flat_u = np.array(np.broadcast_to(inputs, (*shape, NUM_SLOTS)), order="C")
         full, flat_u = full.reshape(count, PADDED), flat_u.reshape(count, NUM_SLOTS)
         result, outcome = np.empty((count, RESULTS)), np.empty(count, dtype=np.int64)
         map_many(*self.kernel, full, flat_u, self.work.scratch, result, outcome)

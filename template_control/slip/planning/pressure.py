@@ -16,13 +16,13 @@ a quadratic program with bounds, which :func:`bounded` solves.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from template_control.arrays import Array
 from template_control.cholesky import cholesky, solve_cholesky
-from template_control.compiled import compiled
+from template_control.compiled import compiled, constant
 from template_control.slip.dynamics.timed import TERMS, Quintic, polynomial, quintic
 from template_control.warm_up import Part
 
@@ -39,7 +39,7 @@ _PULL = 1e-9  # from a bound, which frees nothing
 # A metre by which an end is missed, made good all along a way of a duration T, moves the centre of
 # pressure by 1 m and this over (w T)^2.
 _LED = 6.0
-_FIRST: Any = np.int64(0)  # way; for a literal Numba would compile what it is handed to once more
+_FIRST = constant(0)  # way
 _DIRECTIONS = 9  # of x and x' / w at the end, in which an end may be out of reach
 # Largest w times the duration that is planned with, about twice that of a CoM that stays up. One
 # that falls diverges so fast that of the program nothing would be left but rounding.

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from template_control.arrays import Array, IntArray
-from template_control.compiled import compiled, compiled_into
+from template_control.compiled import compiled, compiled_into, constant
 from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outcome, StrideKind
 from template_control.slip.control.least_squares import copy
 from template_control.slip.control.touchdown import steepest
@@ -23,7 +23,7 @@ from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
 from template_control.slip.parameters import SlipParameters
 from template_control.warm_up import Part
 
-_FAST = np.int64(MapKind.IMPROVED)  # Numba would compile once more for a literal int
+_FAST = constant(MapKind.IMPROVED)
 _FLIES = int(Outcome.UNWANTED_FLIGHT)
 FALL_PRICE = 1e6
 """Price of a second step that fails; a first step that fails costs twice that."""
