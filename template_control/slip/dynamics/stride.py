@@ -184,18 +184,7 @@ class StrideSimulator:
         self._plain = tuple(self._scratch)
         self._names = tuple(node.name for node in automaton.nodes)
         # By numbers: to hash a member of an enumeration takes long.
-        self._edges = [
-            {
-                int(e.event): (
-                    e.event,
-                    node.name,
-                    e.target if isinstance(e.target, str) else "",
-                    e.reset,
-                )
-                for e in node.edges
-            }
-            for node in automaton.nodes
-        ]
+        self._edges = [{int(edge.event): edge for edge in node.edges} for node in automaton.nodes]
         self._kernels = {name: plain(self.kernel(name)) for name in automaton.index}
 
     def kernel(self, start: str) -> Kernel:
@@ -235,10 +224,11 @@ class StrideSimulator:
 
     def _fired(self, rows: Array) -> tuple[FiredEvent, ...]:
         """Events from the kernel's rows (n, 8): time, event, nodes left and entered, state."""
-        fired, edges = [], self._edges
-        for row, state in zip(rows.tolist(), rows[:, 4:8].copy(), strict=True):
-            event, source, entered, reset = edges[int(row[2])][int(row[1])]
-            fired.append(FiredEvent(row[0], event, source, entered, state, reset))
+        fired, names = [], self._names
+        for (time, event, node, *_), state in zip(rows.tolist(), rows[:, 4:8].copy(), strict=True):
+            edge = self._edges[int(node)][int(event)]
+            target = edge.target if isinstance(edge.target, str) else ""
+            fired.append(FiredEvent(time, edge.event, names[int(node)], target, state, edge.reset))
         return tuple(fired)
 
 
