@@ -9,7 +9,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
-from template_control.slip.automaton.vocabulary import Slot, StrideKind
+from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.control.lqr import (
     CONTROL_WEIGHT,
     SETTLED_TOLERANCE,
@@ -113,8 +113,7 @@ def _rows(chain: Chain, p: SlipParameters) -> Array:
     rows = np.zeros((len(chain.height), WIDTH))
     for i, row in enumerate(rows):
         k = float(chain.stiffness[i]) * weight
-        u = controls(float(chain.touchdown_angle[i]), k, k)
-        u[Slot.K_PUSH] = k
+        u = controls(float(chain.touchdown_angle[i]), k, k, k_push=k)
         z = np.array([chain.vlo_speed[i] * unit, chain.height[i] * p.rest_length, 0.0])
         result, slopes, _ = step.derivatives(z, u, COLUMNS)
         units = np.array([1.0, *[k] * (CONTROLS - 1)])

@@ -64,21 +64,18 @@ def speed_changes(parameters: SlipParameters) -> SpeedChanges:
     text = files(__package__).joinpath("speed_changes.json").read_text(encoding="utf-8")
     scale, unit = Scale.of(parameters), parameters.speed_unit
     weight = parameters.mass * parameters.gravity / parameters.rest_length
-    rest, start, speed = [], [], []
+    rest = []
     for change in json.loads(text)["changes"]:
         states = np.array(change["states"]) * [unit, parameters.rest_length, unit]
         free, stiffness = np.array(change["controls"]), np.array(change["stiffness"]) * weight
-        for i in range(len(free)):
-            rest.append(SpeedChange(states[i:], free[i:].copy(), stiffness[i:].copy()))
-            start.append(states[i])
-            speed.append(states[-1, 0])
-    length = np.array([len(change.controls) for change in rest], dtype=np.float64)
+        rest += [SpeedChange(states[i:], free[i:], stiffness[i:]) for i in range(len(free))]
+    speed = np.array([change.states[-1, 0] for change in rest])
     return SpeedChanges(
-        np.array(start),
-        np.array(speed),
-        length,
-        tuple(rest),
-        STATE_TOLERANCE * scale.state,
-        _NEAR * scale.speed,
-        (min(speed), max(speed)),
+        start=np.array([change.states[0] for change in rest]),
+        speed=speed,
+        length=np.array([len(change.controls) for change in rest], dtype=np.float64),
+        rest=tuple(rest),
+        tolerance=STATE_TOLERANCE * scale.state,
+        near=_NEAR * scale.speed,
+        speeds=(speed.min(), speed.max()),
     )
