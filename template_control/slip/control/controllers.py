@@ -250,13 +250,9 @@ class ModifiedWalking(Controller):
 class WalkToRun(Controller):
     """VLO to apex with the front leg's stiffnesses before and after its bottom: (39) to (41).
 
-    A guess's touchdown angle, k_sc and k_sd, which are the walking controller's, are kept.
-
-    Args:
-        parameters: the template.
-        kind: of return map.
-        simplified: ignore the rear leg after the virtual bottom, as the paper's controller
-            does; its reference then has to be tuned (Table IV).
+    As :class:`Controller`; a guess's touchdown angle, k_sc and k_sd, which are the walking
+    controller's, are kept. If ``simplified``, the rear leg is ignored after the virtual bottom, as
+    by the paper's controller; its reference then has to be tuned (Table IV).
     """
 
     design = Design(
@@ -330,9 +326,8 @@ def section_target(
         # weight * y + stiffness * (rest_length - y)^2 / 2 = rest, the root next to rest_length
         rest = quantities["energy"] - 0.5 * p.mass * quantities["speed"] ** 2
         over = rest - weight * p.rest_length
-        slope = weight
-        root = slope**2 + 2.0 * stiffness * over
-        y = p.rest_length + (2.0 * over / (slope + np.sqrt(root)) if root >= 0.0 else np.nan)
+        root = weight**2 + 2.0 * stiffness * over
+        y = p.rest_length + (2.0 * over / (weight + np.sqrt(root)) if root >= 0.0 else np.nan)
     if "speed" in quantities:
         speed = quantities["speed"]
     else:

@@ -192,14 +192,9 @@ class SpeedFamily:
         return self._chain(parameters, mean_speed).gait_for(parameters, mean_speed)
 
     def vlo_for(self, parameters: SlipParameters, mean_speed: float) -> tuple[float, float]:
-        """dx/dt and y at VLO of the gait with a mean speed, interpolated, without looking for it.
+        """As :meth:`gait_for`, but its dx/dt [m/s] and y [m] at VLO, interpolated.
 
-        Args:
-            parameters: the template.
-            mean_speed: step length over step duration [m/s]; beyond the range its end counts.
-
-        Returns:
-            dx/dt [m/s], y [m].
+        Beyond the range its end counts.
         """
         chain, unit = self._chain(parameters, mean_speed), parameters.speed_unit
         known, by_speed = chain.mean_speed, chain.vlo_by_mean_speed
@@ -265,11 +260,7 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
 
 
 def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
-    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg.
-
-    Args:
-        parameters: the template.
-    """
+    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg."""
     return walking_by_speed().chains[-1].gaits(parameters)
 
 
@@ -320,8 +311,8 @@ def gait_for_speed(
     found = next(roots(lambda speed: mean(speed) - mean_speed, speeds, xtol=_XTOL), None)
     if found is not None:
         return gait_at(p, angle, found)
-    means, hint = [mean(speed) for speed in speeds.tolist()], "give another angle, or none"
-    known = [value for value in means if np.isfinite(value)]
+    hint = "give another angle, or none"
+    known = [value for speed in speeds.tolist() if np.isfinite(value := mean(speed))]
     if known:
         low, high = np.ceil(100.0 * known[0]) / 100.0, np.floor(100.0 * known[-1]) / 100.0
         if not low <= mean_speed <= high:
