@@ -14,21 +14,18 @@ from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.warm_up import Part
 
-_TEMPLATE = SlipParameters()
-_K0 = _TEMPLATE.leg_stiffness
-_STATE = np.array([1.1, 0.978, 0.0])
-_CONTROLS = controls(1.152, _K0, _K0)  # near a gait's, so that a stride passes all of its phases
-
 
 def strides() -> None:
     """A stride, a map and its Jacobian, and the solver, called as planners call them."""
-    simulate_stride(_TEMPLATE, STRIDE_START[StrideKind.WALK], VLO.state(_STATE), _CONTROLS)
-    step = ReturnMap(_TEMPLATE)
-    step.step(_STATE, _CONTROLS)
-    step.linearise(_STATE, _CONTROLS)
-    table = np.array([[_CONTROLS[0]], [1.0], [1.0], [1.2]])
-    prior = Prior(_CONTROLS, [0], table, Search(1))
-    solve_stride(whole(step, _STATE), _STATE, prior, np.eye(3))
+    template, z = SlipParameters(), np.array([1.1, 0.978, 0.0])
+    k0 = template.leg_stiffness
+    u = controls(1.152, k0, k0)  # near a gait's, so that a stride passes all of its phases
+    simulate_stride(template, STRIDE_START[StrideKind.WALK], VLO.state(z), u)
+    step = ReturnMap(template)
+    step.step(z, u)
+    step.linearise(z, u)
+    prior = Prior(u, [0], np.array([[u[0]], [1.0], [1.0], [1.2]]), Search(1))
+    solve_stride(whole(step, z), z, prior, np.eye(3))
 
 
 STRIDES = (Part(strides, 21.3),)

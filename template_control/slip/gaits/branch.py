@@ -169,8 +169,7 @@ class Branch(ABC):
 
         The direction is in scaled coordinates; None: any X will do. A GaitError without a gait.
         """
-        start = x.copy()
-        x = x.copy()
+        start = x
         for _ in range(_NEWTON):
             residual, jacobian, valid, *_ = self.equations(x)
             if not valid:

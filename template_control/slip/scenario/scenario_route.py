@@ -208,9 +208,8 @@ class ScenarioRoute:
         if segment.gait == STAND:
             slow = self._bears or speed <= _STOPPABLE * self._unit
             return replace(here, walking=False), kind if slow else StrideKind.CHANGE_SPEED
-        if self._bears or not self.scenario.stands:
-            return replace(here, walking=True), kind
-        if abs(speed - here.wanted(segment, now)) <= _BEHIND * self._unit:
+        near = abs(speed - here.wanted(segment, now)) <= _BEHIND * self._unit
+        if near or self._bears or not self.scenario.stands:
             return replace(here, walking=True), kind
         return here, StrideKind.CHANGE_SPEED
 
