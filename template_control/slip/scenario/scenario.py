@@ -203,22 +203,21 @@ def _check_profile(segments: tuple[Segment, ...]) -> None:
             speed = 0.0
         elif segment.speed is not None:
             speed = segment.speed
-        ends = [] if segment.duration is None else [segment.duration]
-        until, rate = segment.until_speed, segment.acceleration
+        lasts, until, rate = segment.duration or 0.0, segment.until_speed, segment.acceleration
         if until is not None and speed is not None:
-            ends.append((until - speed) / rate)
-            if ends[-1] < 0.0:
+            lasts = (until - speed) / rate
+            if lasts < 0.0:
                 raise ScenarioError(
                     f"segment {i} begins at {speed:g} m/s and never gets to until_speed {until:g}"
                     f" with an acceleration of {rate:g}: give the other sign"
                 )
-        total += min(ends, default=0.0)
+        total += lasts
         if total > _LONGEST:
             raise ScenarioError(
                 f"segment {i} ends after {total:g} s: give a scenario of at most {_LONGEST:g} s"
             )
-        known = speed is not None and segment.steps is None and ends
-        speed = max(speed + rate * min(ends), 0.0) if known and speed is not None else None
+        if speed is not None:
+            speed = max(speed + rate * lasts, 0.0) if segment.steps is None else None
     strides = sum(segment.steps or 0 for segment in segments)
     if strides > MOST_STRIDES:
         raise ScenarioError(f"the segments have {strides} steps: give at most {MOST_STRIDES}")

@@ -47,7 +47,7 @@ class _Progress:
     """Progress of a run in its scenario."""
 
     speed: float  # of the profile where the segment begins [m/s]
-    began: float | None = None  # when that was, None before the run [s]
+    began: float = 0.0  # when that was [s]
     index: int = 0  # of the segment
     strides: int = 0  # done in the segment, transitions not counted
     duration: Mapping[str, float] = field(default_factory=dict)  # of each kind's last stride [s]
@@ -75,7 +75,7 @@ class _Progress:
 
     def profile(self, segment: Segment, now: float) -> float:
         """The segment's profile, whatever ends it [m/s]."""
-        return self.speed + segment.acceleration * (now - (self.began or 0.0))
+        return self.speed + segment.acceleration * (now - self.began)
 
     def wanted(self, segment: Segment, now: float) -> float:
         """The profile's speed, which stops rising at ``until_speed`` [m/s]."""
@@ -86,7 +86,7 @@ class _Progress:
 
     def ends(self, segment: Segment, now: float, speed: float) -> bool:
         """True if the segment ends at a section passed at ``now`` with ``speed``."""
-        if segment.duration is not None and now - (self.began or 0.0) >= segment.duration:
+        if segment.duration is not None and now - self.began >= segment.duration:
             return True
         if segment.steps is not None and self.strides >= segment.steps:
             return True
