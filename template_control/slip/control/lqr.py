@@ -16,14 +16,7 @@ SETTLED_TOLERANCE = (0.011, 0.005, 0.03)
 def lqr(a: Array, b: Array, q: Array, r: Array) -> tuple[Array, Array]:
     """Cost-to-go P (n, n) and gain K (c, n) of u = -K z for z_next = A z + B u.
 
-    Args:
-        a: A (n, n).
-        b: B (n, c).
-        q: cost of z (n, n).
-        r: cost of u (c, c).
-
-    Raises:
-        LinAlgError: if no gain holds the state.
+    ``q`` (n, n) is the cost of z, ``r`` (c, c) that of u. A LinAlgError if no gain holds the state.
     """
     cost = solve_discrete_are(a, b, q, r)
     return cost, np.linalg.solve(r + b.T @ cost @ b, b.T @ cost @ a)

@@ -60,9 +60,8 @@ class Section:
             z: state at the section.
             x: of the CoM, which no section keeps [m].
         """
-        full = np.zeros(4)
-        full[0] = x
-        full[list(self.order)] = z
+        full = np.array([x, 0.0, 0.0, 0.0])
+        full[self._places] = z
         return full
 
     def padded(self, z: ArrayLike) -> Array:
