@@ -6,6 +6,7 @@ chooses the code of :func:`evaluate` and :func:`slopes`, which it declares by ``
 
 from __future__ import annotations
 
+from sys import maxsize
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ class Search(NamedTuple):
     rounds: int  # steps that lower the cost; as many more may be tried again, shorter
     close: float = 0.03  # the last step's length in units of change: what it leaves is its square
     grid: int = 5  # points of each unknown that are tried where the start fails; 0: none
-    gridded: int = 9  # so many unknowns, the first ones, have a grid; the others stay at the start
+    gridded: int = maxsize  # so many of them, the first ones; the others stay at the start
     save: float = 0.0  # share of the cost that a step has to save for another one
     hopeless: float = np.inf  # cost after two rounds from which on no others follow
     # Damping after a bad step. Where equations weigh more than wishes, less of it stops the latter.

@@ -146,7 +146,6 @@ def corrected(
     angle = a[4] + a[7] * a[2]
     radius = a[1] + a[3]
     speed = a[5] * a[2]
-    p0 = p1 = p2 = momentum
     r1 = r2 = radius
     s, c = np.sin(angle), np.cos(angle)
     x, y = a[0] + radius * c, radius * s
@@ -165,9 +164,9 @@ def corrected(
             pull_1, torque_1, r1 = pull, torque, r
         else:
             pull_2, torque_2, r2 = pull, torque, r
-    p1 = p0 + t / 24.0 * (5.0 * torque_0 + 8.0 * torque_1 - torque_2)
-    p2 = p0 + t / 6.0 * (torque_0 + 4.0 * torque_1 + torque_2)
-    pull_0 += p0 * p0 / radius**3
+    p1 = momentum + t / 24.0 * (5.0 * torque_0 + 8.0 * torque_1 - torque_2)
+    p2 = momentum + t / 6.0 * (torque_0 + 4.0 * torque_1 + torque_2)
+    pull_0 += momentum * momentum / radius**3
     pull_1 += p1 * p1 / r1**3
     pull_2 += p2 * p2 / r2**3
     # pull = q0 + q1 t + q2 t^2 through the three points.
@@ -181,7 +180,7 @@ def corrected(
     a[3] = radius - a[1]
     a[7] = 0.0
     # Angular rate through three points of the new radius.
-    rates_0 = p0 / (radius * radius)
+    rates_0 = momentum / (radius * radius)
     s, c = np.sin(0.5 * a[5] * t), np.cos(0.5 * a[5] * t)
     r1 = a[1] + (a[8] + 0.5 * a[9] * t) * 0.5 * t + a[2] * s + a[3] * c
     s, c = 2.0 * s * c, c * c - s * s

@@ -172,9 +172,8 @@ def all_bends(
     x, y = state[0], abs(state[1]) + speed * step
     rear, front = abs(x - toes[0]), abs(x - toes[1])
     turn = 3.0 * speed * acceleration
-    bends[Event.TOUCHDOWN] = bends[Event.VLO] = bends[Event.PASSED_FRONT_FOOT] = bends[
-        Event.FALL
-    ] = acceleration
+    bends[Event.TOUCHDOWN] = bends[Event.FALL] = acceleration
+    bends[Event.VLO] = bends[Event.PASSED_FRONT_FOOT] = acceleration
     bends[Event.APEX] = bends[Event.BACKWARD] = jerk
     bends[Event.BOTTOM] = turn + (rear + y) * jerk
     bends[Event.VIRTUAL_BOTTOM] = turn + (0.5 * (rear + front) + y) * jerk

@@ -24,7 +24,6 @@ from template_control.slip.maps.return_map import EXACT, RESULTS, one_stride
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 
-_MOST = 100_000  # steps
 _WINDOW = 5
 _THERE = 0.01  # as near as this, it need not come nearer
 _SHRINKS = 0.95  # of the distance half-way must be left at most: no other gait, no cycle
@@ -135,7 +134,7 @@ def steps_to_fall(
     z: Annotated[Array, Shape((None, 3), finite=False)],
     controls: Annotated[Array, Shape((..., NUM_SLOTS), finite=False)],
     goal: Annotated[Array, Shape((..., 2))],
-    limit: Annotated[int, Range(1, _MOST)] = 50,
+    limit: Annotated[int, Range(1, 100_000)] = 50,
 ) -> StepsToFall:
     """Walk passively from many states.
 

@@ -116,7 +116,6 @@ def energy_gradient(
 Policy = Callable[[Array], Array]
 """Controls (NUM_SLOTS,) at a section state (n,)."""
 _DIFFERENCE = 1e-6
-_NOISE = 1e-5  # of eigenvalues: a controller's search ends at 1e-10, over the difference
 
 
 class ControlledFamily(branch.Branch):
@@ -137,7 +136,7 @@ class ControlledFamily(branch.Branch):
     """
 
     free: tuple[str, ...] = ("target",)
-    noise = _NOISE
+    noise = 1e-5  # a controller's search ends at 1e-10, over the difference
 
     @checked
     def __init__(self, step: ReturnMap, policy: TargetedPolicy, varied: str) -> None:

@@ -95,9 +95,6 @@ class Side(IntEnum):
         return 0 if self is Side.LEFT else 1
 
 
-_NEXT = 2 + NEXT  # column of the next foothold
-
-
 @dataclass(frozen=True)
 class LateralGait:
     """The sideways step map of a gait, from section to section, and its cost-to-go.
@@ -164,7 +161,7 @@ def lateral_gait(
             f"gait {gait.name!r} has no sideways step: {stride.outcome.reason or 'no foot lands'}"
         )
     m = transition(path, 0.0, path.section)
-    a, b = m[:, :2], m[:, _NEXT] - (1.0, 0.0)
+    a, b = m[:, :2], m[:, 2 + NEXT] - (1.0, 0.0)
     o = scaled(options or LateralOptions(), Scale.of(p))
     try:
         cost = solve_discrete_are(a, b[:, None], np.diag(o.state_cost), np.array([[o.step_cost]]))
