@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
@@ -174,21 +173,14 @@ Draw = Callable[[Any, Look], "Figure"]  # figure of a run, of which it shows a p
 
 def telling(record: Record, seconds: float = WINDOW) -> tuple[float, float]:
     """Part of a run that shows its fall, else its first push, other stride or uneven ground [s]."""
-    time, last = record.time, float(record.time[-1])
-    pushed = np.flatnonzero(record.push)
-    changes = [i for i, (a, b) in enumerate(pairwise(record.kinds_of_stride), 1) if a != b]
-    height = record.ground.height_at
-    uneven = np.flatnonzero(np.diff([height(x) for x in record.com[::50, 0]]))
-    middle = last
-    if record.fell:
-        pass
-    elif len(pushed):
-        middle = float(time[pushed[0]]) + 0.3 * seconds
-    elif changes:
-        middle = float(record.section_time[changes[0]])
-    elif len(uneven):
-        middle = float(time[::50][uneven[0]])
-    begin = min(max(middle - 0.5 * seconds, float(time[0])), max(last - seconds, float(time[0])))
+    time = record.time
+    first, last = float(time[0]), float(time[-1])
+    heights = [record.ground.height_at(x) for x in record.com[::50, 0]]
+    pushed = time[record.push != 0.0] + 0.3 * seconds
+    changed = record.section_time[1:][np.diff(record.stride) != 0]
+    uneven = time[::50][:-1][np.diff(heights) != 0.0]
+    found = [last] if record.fell else [*pushed[:1], *changed[:1], *uneven[:1], last]
+    begin = min(max(float(found[0]) - 0.5 * seconds, first), max(last - seconds, first))
     return begin, min(begin + seconds, last)
 
 
@@ -271,8 +263,7 @@ def finish(figure: Figure, panels: Iterable[Axes], title: str, look: Look) -> Fi
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, handle)
     for name, color, alpha in ((_SINGLE, _GREY, None), (_TRANSITION, COM, _GREEN)):
-        if name in found:  # last, and as a patch
-            del found[name]
+        if found.pop(name, None) is not None:  # last, and as a patch
             found[name] = Patch(facecolor=color, alpha=alpha, edgecolor="0.7", linewidth=0.4)
     if found:
         figure.legend(
