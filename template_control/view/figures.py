@@ -57,7 +57,6 @@ if TYPE_CHECKING:
 _LOOK = Look()
 _POSES = 0.06  # [s] from one pose of the stick diagram to the next
 _MOST_POSES = 40
-Rows = Sequence[tuple[Array, str, str]]
 
 
 def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
@@ -183,28 +182,25 @@ def apex_return(record: Record, look: Look = _LOOK) -> Figure:
     return finish(figure, panels, f"{as_text(record.robot_name)}: from apex to apex", look)
 
 
-def _lines(record: Record, seconds: float, rows: Rows, title: str, look: Look) -> Figure:
-    """Panels over time, each with values (T,), their name with its unit, and their colour."""
-    curves = {name: [(of, {"color": color, "linewidth": 0.9})] for of, name, color in rows}
-    height = 0.8 + 1.7 * len(rows)
-    drawn = over_time(record, look.rows(record, seconds), curves, height, zero=True)
-    return finish(*drawn, f"{as_text(record.robot_name)}: {title}", look)
-
-
 def turning(record: Record, look: Look = _LOOK) -> Figure:
     """Pitch of the trunk, and angular momentum about the CoM, which in flight keeps its value."""
-    rows = (
-        (np.degrees(record.q[:, 2]), "trunk pitch [deg]", TRUNK),
-        (record.angular_momentum, "angular momentum\n[N m s]", COM),
-    )
-    return _lines(record, WINDOW, rows, "trunk and angular momentum, forward positive", look)
+    rows = {
+        "trunk pitch [deg]": [(np.degrees(record.q[:, 2]), {"color": TRUNK, "linewidth": 0.9})],
+        "angular momentum\n[N m s]": [(record.angular_momentum, {"color": COM, "linewidth": 0.9})],
+    }
+    drawn = over_time(record, look.rows(record, WINDOW), rows, 4.2, zero=True)
+    name = as_text(record.robot_name)
+    return finish(*drawn, f"{name}: trunk and angular momentum, forward positive", look)
 
 
 def attitude(record: FloatingRecord, look: Look = _LOOK) -> Figure:
     """Roll, pitch and yaw of the trunk in the heading frame."""
-    angles = zip(np.degrees(record.attitude).T, ("roll", "pitch", "yaw"), strict=True)
-    rows = [(values, f"{name} [deg]", TRUNK) for values, name in angles]
-    return _lines(record, 2.0 * WINDOW, rows, "trunk in the heading frame", look)
+    angles = zip(("roll", "pitch", "yaw"), np.degrees(record.attitude).T, strict=True)
+    line = {"color": TRUNK, "linewidth": 0.9}
+    rows = {f"{name} [deg]": [(values, line)] for name, values in angles}
+    w, height = look.rows(record, 2.0 * WINDOW), 0.8 + 1.7 * len(rows)
+    drawn = over_time(record, w, rows, height, zero=True)
+    return finish(*drawn, f"{as_text(record.robot_name)}: trunk in the heading frame", look)
 
 
 def footholds(record: FloatingRecord, foot: int) -> tuple[Array, Array]:
@@ -374,9 +370,8 @@ def save_figures(
         ParameterError: if there is no such figure of this run.
         RecordError: if the folder cannot be written or the run cannot be shown.
     """
-    paths = []
     with figure_style():
-        for name, draw in _chosen(record, figures, template).items():
-            path = Path(folder) / f"{name}.{file_format}"
-            paths.append(save_figure(draw(record, look or _LOOK), path, dpi))
-    return paths
+        return [
+            save_figure(draw(record, look or _LOOK), Path(folder) / f"{name}.{file_format}", dpi)
+            for name, draw in _chosen(record, figures, template).items()
+        ]
