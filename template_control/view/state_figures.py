@@ -28,7 +28,6 @@ from template_control.view.style import (
 )
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _LOOK = Look()
@@ -58,14 +57,13 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
     """
     figure, (upright, forward) = panelled(4.4, 1, 2)
     toe = record.of_legs(record.foot)[np.arange(len(record.time)), record.rear, 0]
-    target, last = record.section_target[-1], _sections(record)[-1]
+    last = _sections(record)[-1]
     rows = np.minimum(np.searchsorted(record.time, record.section_time), len(record.time) - 1)
-    speed, height, climb = record.section_state.T
-    panels: tuple[tuple[Axes, int, Array, tuple[Array, Array], tuple[float, float]], ...] = (
-        (upright, 1, np.zeros(len(toe)), (height, climb), (target[1], target[2])),
-        (forward, 0, toe, (np.zeros(len(speed)), speed), (0.0, target[0])),
-    )
-    for axes, axis, origin, planned, wanted in panels:
+    # x from the foot, which is zero at VLO, and the state: dx/dt, y, dy/dt.
+    planned = np.insert(record.section_state, 0, 0.0, axis=1).T
+    wanted = np.insert(record.section_target[-1], 0, 0.0)
+    for axes, axis, origin in ((upright, 1, np.zeros(len(toe))), (forward, 0, toe)):
+        shown = slice(2 * axis, 2 * axis + 2)
         axes.locator_params(axis="x", nbins=6)
         for position, velocity, color, style, name in (
             (record.com, record.com_velocity, COM, "-", "robot"),
@@ -86,11 +84,11 @@ def phase_portrait(record: Record, look: Look = _LOOK) -> Figure:
         if not (axis or last is VLO):
             continue  # only at VLO it is known how far ahead of the foot the CoM is
         axes.plot(
-            *planned, "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
+            *planned[shown], "o", color=RIGHT, fillstyle="none", markersize=4, zorder=4,
             label="state used by the planner",
         )  # fmt: skip
         label = f"{in_words(last.name)} of the gait"
-        axes.plot(*wanted, "*", color=LEFT, markersize=11, zorder=5, label=label)
+        axes.plot(*wanted[shown], "*", color=LEFT, markersize=11, zorder=5, label=label)
     up = upward(record)
     upright.set(xlabel=f"{up} [m]", ylabel=f"d{up}/dt [m/s]")
     forward.set(xlabel="x from the rear stance foot [m]", ylabel="dx/dt [m/s]")
