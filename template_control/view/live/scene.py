@@ -23,7 +23,6 @@ from template_control.run.record import FloatingRecord, Record
 from template_control.view.replay.playback import spring
 from template_control.view.replay.robot_visuals import foot_sides, load_shapes, triangles
 from template_control.view.replay.scene import (
-    Space,
     in_space,
     plates,
     raised,
@@ -60,7 +59,8 @@ class _Span:
         self.node.visible = visible
         if visible:
             size = float(np.linalg.norm(span))
-            self.node.position, self.node.wxyz = begin, _turned(span)
+            self.node.position = begin
+            self.node.wxyz = turned_to(span[None])[0][[3, 0, 1, 2]]
             self.node.scale = size if self.grows else (1.0, 1.0, size)
 
 
@@ -79,11 +79,6 @@ class _Joint:
         if moved[3:].any():
             self._shown[3:] = pose[3:]
             self.node.wxyz = pose[[6, 3, 4, 5]]
-
-
-def _turned(direction: Array) -> Array:
-    """Quaternion w, x, y, z that turns the vertical into a direction (3,)."""
-    return np.asarray(turned_to(direction[None])[0][[3, 0, 1, 2]])
 
 
 class LiveScene:
@@ -201,7 +196,7 @@ class LiveScene:
         """
         last = {name: values[-1:] for name, values in columns.items()}
         places = in_space(self._record, self._sides, last)
-        frame = Space._make(values[0] for values in places)
+        frame = places.at(0)
         x, y, _ = frame.com.tolist()
         level = float(smoothed(self._terrain, np.array([x]), self._length)[0])
         self._world.position = (-x, -y, -level - self._middle)

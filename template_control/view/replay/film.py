@@ -33,16 +33,8 @@ _AROUND = 3.0  # rest lengths of ground that are drawn next to the path
 _LEFTWARD, _ABOVE = np.radians(-25.0), np.radians(18.0)  # the camera's, from a view from the right
 
 # Rows: to the right and upward in the picture; without perspective, so that lengths compare.
-IN_SPACE = np.array(
-    [
-        [np.cos(_LEFTWARD), np.sin(_LEFTWARD), 0.0],
-        [
-            -np.sin(_LEFTWARD) * np.sin(_ABOVE),
-            np.cos(_LEFTWARD) * np.sin(_ABOVE),
-            np.cos(_ABOVE),
-        ],
-    ]
-)
+_X, _Y = np.cos(_LEFTWARD), np.sin(_LEFTWARD)
+IN_SPACE = np.array([[_X, _Y, 0.0], [-_Y * np.sin(_ABOVE), _X * np.sin(_ABOVE), np.cos(_ABOVE)]])
 """Camera of a floating-base run: from the right and from behind."""
 FROM_THE_SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # camera of a planar run
 
@@ -56,8 +48,9 @@ class Stage:
 
     def __init__(self, playback: Playback) -> None:
         record = playback.record
-        self.playback, self._space = playback, in_space(record, np.zeros(len(record.feet)))
-        self._stood = stood(record, self._space)
+        space = in_space(record, np.zeros(len(record.feet)))
+        self._stood, self._space = stood(record, space), space.at(playback.rows)
+        self._record, self._times = record, record.time[playback.rows]
         self.joints, self.corners, on_left = _bodies(record, playback.rows)
         self._length = length = record.template.rest_length
         flat = not isinstance(record, FloatingRecord)
@@ -69,7 +62,7 @@ class Stage:
         self._axes = axes = self.figure.subplots()
         axes.set_aspect("equal", adjustable="box")
         self._draw_ground(flat)
-        self._level = smoothed(record.ground, self._space.com[playback.rows, 0], length)
+        self._level = smoothed(record.ground, self._space.com[:, 0], length)
         tall = float(self.corners[0, :, 2].max() - self._level[0]) * self.camera[1, 2]
         high = max(_FLATTER * _WIDTH * length, _OVER * tall / (1.0 - self._below))
         self._size = high / _FLATTER, high
@@ -115,8 +108,8 @@ class Stage:
 
     def _draw_ground(self, flat: bool) -> None:
         """The ground around the path: its profile, or a net of lines every rest length."""
-        record, length = self.playback.record, self._length
-        place = self._space.com[self.playback.rows, :2] / length
+        record, length = self._record, self._length
+        place = self._space.com[:, :2] / length
         low, high = np.floor(place.min(axis=0) - _AROUND), np.ceil(place.max(axis=0) + _AROUND)
         (x0, y0), (x1, y1) = (length * low).tolist(), (length * high).tolist()
         along = np.array(record.ground.line(x0, x1))
@@ -138,29 +131,25 @@ class Stage:
 
     def show(self, frame: int) -> None:
         """Draw a frame."""
-        record, space, rows = self.playback.record, self._space, self.playback.rows
-        row, seen = rows[frame], self.seen
-        com, feet = space.com[row], space.foot[row]
+        now, time, seen = self._space.at(frame), self._times[frame], self.seen
         self._trunk.set_xy(seen(self.corners[frame]))
         for foot, leg in enumerate(self.legs):
-            leg.set_data(*seen(np.vstack((self.joints[frame, foot], feet[foot]))).T)
+            leg.set_data(*seen(np.vstack((self.joints[frame, foot], now.foot[foot]))).T)
             places, since = self._stood[foot]
-            self._marks[foot].set_data(*seen(places[since <= record.time[row]]).T)
-        template = seen(space.template[row])
-        for end, line in enumerate(self._springs):
-            pushes = space.loaded[row, end]
-            ends = (template, seen(space.toes[row, end]))
-            line.set_data(*(coil(self._spring, *ends) if pushes else ([], [])))
-        self._trail.set_data(*seen(space.com[rows[: frame + 1]]).T)
-        self._com.set_data(*seen(com)[:, None])
+            self._marks[foot].set_data(*seen(places[since <= time]).T)
+        template = seen(now.template)
+        for line, toe, loaded in zip(self._springs, now.toes, now.loaded, strict=True):
+            line.set_data(*(coil(self._spring, template, seen(toe)) if loaded else ([], [])))
+        self._trail.set_data(*seen(self._space.com[: frame + 1]).T)
+        self._com.set_data(*seen(now.com)[:, None])
         self._template.set_data(*template[:, None])
-        self._forces.set_offsets(seen(feet))
-        self._forces.set_UVC(*seen(space.arrow[row]).T)
-        x, y = seen(np.array([com[0], com[1], self._level[frame]])).tolist()
+        self._forces.set_offsets(seen(now.foot))
+        self._forces.set_UVC(*seen(now.arrow).T)
+        x, y = seen(np.array([*now.com[:2], self._level[frame]])).tolist()
         wide, high = self._size
         self._axes.set_xlim(x - 0.5 * wide, x + 0.5 * wide)
         self._axes.set_ylim(y - self._below * high, y + (1.0 - self._below) * high)
-        self._time.set_text(f"{record.time[row]:.2f} s")
+        self._time.set_text(f"{time:.2f} s")
 
 
 def _bodies(record: Record, rows: IntArray) -> tuple[Array, Array, BoolArray]:

@@ -101,6 +101,10 @@ class Space(NamedTuple):
     stands: BoolArray
     arrow: Array
 
+    def at(self, samples: Any) -> Space:
+        """The same in some samples, or in one."""
+        return Space._make(values[samples] for values in self)
+
 
 def in_space(record: Record, sides: Array, columns: Mapping[str, Any] | None = None) -> Space:
     """A run in three directions, or some ticks of it; planar feet are ``sides`` (n,) to the left.
@@ -180,10 +184,14 @@ def _packed(numbers: Array) -> umsgpack.Ext:
 
 
 class _Scene:
-    """Collects commands, and tracks of keyframes by path; all last as long as the clock."""
+    """Collects commands, and tracks of keyframes by path; all last as long as the clock.
 
-    def __init__(self, clock: Array) -> None:
-        self.clock = clock
+    ``space`` is of the frames.
+    """
+
+    def __init__(self, playback: Playback, space: Space) -> None:
+        self.record, self.rows, self.clock = playback.record, playback.rows, playback.clock
+        self.space, self.length = space, float(self.record.template.rest_length)
         self._commands: list[dict[str, Any]] = []
         self._tracks: dict[str, list[dict[str, Any]]] = {}
 
@@ -246,16 +254,16 @@ class _Scene:
 
 def scene_commands(playback: Playback) -> list[dict[str, Any]]:
     """Commands that build and animate the scene, as meshcat's viewer takes them."""
-    scene, record = _Scene(playback.clock), playback.record
-    length = float(record.template.rest_length)
+    record = playback.record
     model, shapes = load_shapes(record)
     space = in_space(record, foot_sides(model, record.feet))
-    _surroundings(scene, playback, space, length)
-    _robot(scene, playback, model, shapes)
-    _trail(scene, playback, space, length)
-    _template(scene, playback, space, length)
-    _forces(scene, playback, space, length)
-    _footholds(scene, playback, space, length)
+    scene = _Scene(playback, space.at(playback.rows))
+    _surroundings(scene)
+    _robot(scene, model, shapes)
+    _trail(scene)
+    _template(scene)
+    _forces(scene)
+    _footholds(scene, stood(record, space))
     return scene.finished()
 
 
@@ -282,22 +290,22 @@ def _ribbon(points: Array, width: float) -> Surface:
     return vertices, faces.reshape(-1, 3)
 
 
-def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    record, rows = playback.record, playback.rows
+def _surroundings(scene: _Scene) -> None:
+    ground, length = scene.record.ground, scene.length
     for end in ("top_color", "bottom_color"):
         scene.set("/Background", end, [0.96, 0.97, 0.98])
     for path in ("/Grid", "/Axes"):
         scene.set(path, "visible", False)
-    x, y = space.com[rows, :2].T
+    x, y = scene.space.com[:, :2].T
     sides = float(y.min()) - 1.5 * length, float(y.max()) + 1.5 * length
     ends = float(x.min()) - 6.0 * length, float(x.max()) + 6.0 * length
-    shape, place = ground_shape(np.array(record.ground.line(*ends)), sides, length)
+    shape, place = ground_shape(np.array(ground.line(*ends)), sides, length)
     scene.add("/meshcat/ground", shape, mg.MeshBasicMaterial(color=0xDDE1E6, side="DoubleSide"))
     scene.place("/meshcat/ground", place)
-    lines = stripes(record.ground, ends, (0.5 * (sides[0] + sides[1]), sides[1] - sides[0]), length)
+    lines = stripes(ground, ends, (0.5 * (sides[0] + sides[1]), sides[1] - sides[0]), length)
     material = mg.MeshBasicMaterial(color=0xB4BAC2)
     scene.add("/meshcat/ground_lines", mg.TriangularMeshGeometry(*lines), material)
-    travel = np.stack((x, y, smoothed(record.ground, x, length) + 0.72 * length), axis=-1)
+    travel = np.stack((x, y, smoothed(ground, x, length) + 0.72 * length), axis=-1)
     scene.animate("/meshcat", position=-travel)
     # From afar with a narrow view: little perspective, so that lengths can be compared.
     eye = [0.7 * length, 0.45 * length, 4.0 * length]
@@ -305,8 +313,8 @@ def _surroundings(scene: _Scene, playback: Playback, space: Space, length: float
     scene.set("/Cameras/default/rotated/<object>", "zoom", 2.4)
 
 
-def _robot(scene: _Scene, playback: Playback, model: pin.Model, shapes: pin.GeometryModel) -> None:
-    positions, quaternions = placements(model, shapes, playback.record.q[playback.rows])
+def _robot(scene: _Scene, model: pin.Model, shapes: pin.GeometryModel) -> None:
+    positions, quaternions = placements(model, shapes, scene.record.q[scene.rows])
     for i, shape in enumerate(shapes.geometryObjects):
         path = f"/meshcat/robot/{shape.name}"
         geometry, place = drawn(shape.geometry)
@@ -318,52 +326,50 @@ def _robot(scene: _Scene, playback: Playback, model: pin.Model, shapes: pin.Geom
         scene.animate(path, position=positions[:, i], quaternion=quaternions[:, i])
 
 
-def _trail(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    com = space.com[playback.rows]
+def _trail(scene: _Scene) -> None:
+    com, length = scene.space.com, scene.length
     ribbon, frame = _ribbon(com, 0.008 * length), np.tile(np.arange(len(com)), 4)
     scene.reveal("/meshcat/com_trail", ribbon, frame, COM, depthTest=False)
     scene.add("/meshcat/com", mg.Sphere(0.025 * length), _overlay(COM))
     scene.animate("/meshcat/com", position=com)
 
 
-def _template(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    rows = playback.rows
-    com = space.template[rows]
+def _template(scene: _Scene) -> None:
+    space, length = scene.space, scene.length
     scene.add("/meshcat/template/com/dot", mg.Sphere(0.014 * length), _overlay(TEMPLATE))
     # Nearer to the camera than the robot's CoM, or it would be drawn below that.
     nearer = np.eye(4)
     nearer[1, 3] = -0.03 * length
     scene.place("/meshcat/template/com/dot", nearer)
-    scene.animate("/meshcat/template/com", position=com)
+    scene.animate("/meshcat/template/com", position=space.template)
     coil = mg.TriangularMeshGeometry(*_ribbon(raised(spring(0.03 * length)), 0.01 * length))
     for leg, name in enumerate(("rear_leg", "front_leg")):
         path = f"/meshcat/template/{name}"
         scene.add(path, coil, _overlay(TEMPLATE))
-        scene.stretch(path, com, space.toes[rows, leg] - com, space.loaded[rows, leg])
+        span = space.toes[:, leg] - space.template
+        scene.stretch(path, space.template, span, space.loaded[:, leg])
 
 
-def _forces(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    rows, radius = playback.rows, 0.013 * length
+def _forces(scene: _Scene) -> None:
+    space, radius = scene.space, 0.013 * scene.length
     cone = mg.Cylinder(0.15, radiusTop=0.0, radiusBottom=3.0 * radius)
     parts = ("shaft", mg.Cylinder(0.85, radius), 0.425), ("head", cone, 0.925)
-    for foot, (name, color) in enumerate(feet_shown(playback.record)):
+    for foot, (name, color) in enumerate(feet_shown(scene.record)):
         path = f"/meshcat/ground_force/{name.removesuffix(' foot')}"
         for part, geometry, height in parts:
             upright = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, height], [0, 0, 0, 1]])
             scene.add(f"{path}/{part}", geometry, _overlay(color))
             scene.place(f"{path}/{part}", upright)
-        begin, arrow = space.foot[rows, foot], space.arrow[rows, foot]
-        scene.stretch(path, begin, arrow, space.stands[rows, foot])
+        scene.stretch(path, space.foot[:, foot], space.arrow[:, foot], space.stands[:, foot])
 
 
-def _footholds(scene: _Scene, playback: Playback, space: Space, length: float) -> None:
-    record, rows = playback.record, playback.rows
-    feet = zip(feet_shown(record), stood(record, space), strict=True)
-    for (name, color), (places, since) in feet:
-        shown = since <= record.time[rows[-1]]
+def _footholds(scene: _Scene, feet: list[tuple[Array, Array]]) -> None:
+    length, times = scene.length, scene.record.time[scene.rows]
+    for (name, color), (places, since) in zip(feet_shown(scene.record), feet, strict=True):
+        shown = since <= times[-1]
         if not shown.any():
             continue
         centres = places[shown] + np.array([0.0, 0.0, 0.002 * length])
         marks = plates(centres, (0.05 * length, 0.1 * length))
-        frame = np.repeat(np.searchsorted(record.time[rows], since[shown]), 4)
+        frame = np.repeat(np.searchsorted(times, since[shown]), 4)
         scene.reveal(f"/meshcat/footholds/{name.removesuffix(' foot')}", marks, frame, color)
