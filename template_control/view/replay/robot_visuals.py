@@ -109,14 +109,11 @@ def model_of(record: Record) -> pin.Model:
 def placements(model: pin.Model, shapes: pin.GeometryModel, q: Array) -> tuple[Array, Array]:
     """Positions (F, shapes, 3) [m] and quaternions x, y, z, w of the shapes in ``q`` (F, nq)."""
     data, shape_data = model.createData(), shapes.createData()
-    positions = np.empty((len(q), len(shapes.geometryObjects), 3))
-    quaternions = np.empty((*positions.shape[:2], 4))
+    poses = np.empty((len(q), len(shapes.geometryObjects), 7))
     for i, configuration in enumerate(q):
         pin.updateGeometryPlacements(model, data, shapes, shape_data, configuration)
-        for j, placement in enumerate(shape_data.oMg):
-            vector = pin.SE3ToXYZQUAT(placement)
-            positions[i, j], quaternions[i, j] = vector[:3], vector[3:]
-    return positions, quaternions
+        poses[i] = [pin.SE3ToXYZQUAT(placement) for placement in shape_data.oMg]
+    return poses[..., :3], poses[..., 3:]
 
 
 def foot_sides(model: pin.Model, feet: Sequence[str]) -> Array:
