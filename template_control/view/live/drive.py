@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -41,7 +41,7 @@ _IDLE = 0.05  # [s] between two looks for a tab
 _MOST_TICKS = 1024  # of a frame, that are looked at
 
 
-class Drive:
+class Drive(AbstractContextManager["Drive"]):
     """A run on a page, driven by its visitors; ends with :meth:`close` or the ``with`` block.
 
     The loop is in the thread that calls :meth:`loop`; what the page asks for is done between two of
@@ -96,9 +96,6 @@ class Drive:
             self._thread.join()
         self._page.close()
 
-    def __enter__(self) -> Drive:
-        return self
-
     def __exit__(self, *_: object) -> None:
         self.close()
 
@@ -142,16 +139,15 @@ class Drive:
 
     def _begin(self) -> None:
         """Load the robot, put up the controls, and begin the run."""
-        gui = self._server.gui
         assert isinstance(self._robot, Biped)
         self._ranges = ranges = VelocityRange.of(self._robot)
         self._restart()
-        record = self._going.record()
+        gui, run = self._server.gui, self._going
+        record = run.record()
         ground = getattr(self._experiment.world, "ground", None) or Terrain.flat()
         self._scene = LiveScene(self._server.scene, record, ground)
         self._scene.look(self._server.initial_camera)
         self._figures = Figures(record)
-        run = self._going
         impulse = first_push(run.controller.parameters)
         self._controls = Controls(gui, ranges, impulse, self._ask, run.hand.friction)
         with gui.add_folder("Plots"):

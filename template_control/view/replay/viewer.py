@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import base64
-import contextlib
 import html
 import time
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from string import Template
@@ -62,16 +62,12 @@ if (time !== null) {
 </html>
 """)
 
-_LEGEND = (
-    (COM, "CoM and its trail"),
-    (TEMPLATE, "template: CoM and loaded legs"),
-)
-
 
 def page_of(title: str, commands: list[Any], legs: Sequence[tuple[str, str]]) -> str:
     """Meshcat's viewer as one HTML page, with commands, and legs by name and colour."""
-    feet = [(color, f"{name}: ground force, footholds") for name, color in legs]
-    signs = (f'<b style="color: {c}">&#9632;</b> {text}' for c, text in (*_LEGEND, *feet))
+    shown = [(COM, "CoM and its trail"), (TEMPLATE, "template: CoM and loaded legs")]
+    shown += [(color, f"{name}: ground force, footholds") for name, color in legs]
+    signs = (f'<b style="color: {color}">&#9632;</b> {text}' for color, text in shown)
     packed = (base64.b64encode(umsgpack.packb(c)).decode() for c in commands)
     return _PAGE.substitute(
         title=html.escape(title),
@@ -84,7 +80,7 @@ def page_of(title: str, commands: list[Any], legs: Sequence[tuple[str, str]]) ->
 _PORTS = range(7000, 7100)
 
 
-class ReplayServer:
+class ReplayServer(AbstractContextManager["ReplayServer"]):
     """A running server of a replay's page; ends with :meth:`close` or the ``with`` block."""
 
     def __init__(self, page: str, port: int | None = None) -> None:
@@ -112,7 +108,7 @@ class ReplayServer:
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""
-        with contextlib.suppress(KeyboardInterrupt):
+        with suppress(KeyboardInterrupt):
             while True:
                 time.sleep(3600.0)
 
@@ -120,9 +116,6 @@ class ReplayServer:
         """End the server."""
         self._server.shutdown()
         self._server.server_close()
-
-    def __enter__(self) -> ReplayServer:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
