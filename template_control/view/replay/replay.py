@@ -12,6 +12,7 @@ from template_control.storage import write_text
 from template_control.view.browser import PORTS
 from template_control.view.replay.film import write_film
 from template_control.view.replay.playback import Playback, playback
+from template_control.view.style import legs_shown, moment
 
 if TYPE_CHECKING:
     from template_control.view.replay.viewer import ReplayServer
@@ -59,7 +60,6 @@ def _page(frames: Playback) -> str:
     """Page of a replay, with its legend."""
     from template_control.view.replay.scene import scene_commands
     from template_control.view.replay.viewer import page_of
-    from template_control.view.style import legs_shown
 
     record = frames.record
     title = f"{record.robot_name}, gait {record.gait_name}, {record.steps} steps"
@@ -86,8 +86,8 @@ def save_html(
         ParameterError: if a number is out of its range.
         RecordError: if the run cannot be shown, or the file not be written.
     """
-    page = _page(playback(record, fps=fps, speed=speed, start=start, end=end))
-    return write_text(path, page)
+    frames = playback(record, fps=fps, speed=speed, start=start, end=end)
+    return write_text(path, _page(frames))
 
 
 @checked
@@ -123,8 +123,7 @@ def save_film(
     record.check_shown()
     if is_gif and start is None:
         last = float(record.time[-1])
-        stop = last if end is None else (last + end if end < 0.0 else min(end, last))
+        stop = min(moment(end, last, last), last)
         start = max(float(record.time[0]), stop - GIF_SECONDS * speed)
-    return write_film(
-        path, playback(record, fps=fps, speed=speed, start=start, end=end), fps, progress
-    )
+    frames = playback(record, fps=fps, speed=speed, start=start, end=end)
+    return write_film(path, frames, fps, progress)
