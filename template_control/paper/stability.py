@@ -106,9 +106,7 @@ def settles(ends: Array, branch: list[BranchPoint], gait: WalkingGait) -> BoolAr
     with the height of ``gait``. States that are NaN do not settle.
     """
     p = gait.parameters
-    order = np.argsort([point.energy for point in branch])
-    energies = np.array([branch[i].energy for i in order])
-    angles = np.array([branch[i].angle for i in order])
+    energies, angles = np.array(sorted((point.energy, point.angle) for point in branch)).T
     energy = np.asarray(VLO.energy(p, ends))
     inside = (energy >= energies[0]) & (energy <= energies[-1])
     u = np.tile(gait.controls, (len(ends), 1))
@@ -198,27 +196,20 @@ def fig8(energies: Array = _ENERGIES) -> Reproduction:
         results = pool.map(basin_slice, energies)
         slices = list(counted(results, len(energies), "slices of the basin"))
     steps, converges = (np.array([s[i] for s in slices]) for i in range(2))
-    rows: list[tuple[str, ...]] = [
-        (
-            "upper energy limit [J]",
-            f"{PUBLISHED[1]:.2f}",
-            f"{fold.energy:.4f}",
-            f"fold of the branch; pair of eigenvalues through the unit circle at"
-            f" {torus.energy:.4f}",
-        ),
-        (
-            "lower energy limit [J]",
-            f"{PUBLISHED[0]:.2f}",
-            f"{low:.3f}",
-            f"steps to fall; eigenvalue through +1 at {lost.energy:.4f}",
-        ),
-    ]
-    for energy, good in zip(energies, converges, strict=True):
-        rows.append((f"share of the slice at {energy:.2f} J", "", f"{good.mean():.3f}", ""))
+    least, most = (f"{limit:.2f}" for limit in PUBLISHED)
+    circle = f"pair of eigenvalues through the unit circle at {torus.energy:.4f}"
+    through_one = f"steps to fall; eigenvalue through +1 at {lost.energy:.4f}"
     return Reproduction(
         title="Fig. 8: self-stable basin of the equilibria at y = 0.9818 m",
         columns=("", "paper", "ours", "how"),
-        rows=rows,
+        rows=[
+            ("upper energy limit [J]", most, f"{fold.energy:.4f}", f"fold of the branch; {circle}"),
+            ("lower energy limit [J]", least, f"{low:.3f}", through_one),
+            *(
+                (f"share of the slice at {energy:.2f} J", "", f"{good.mean():.3f}", "")
+                for energy, good in zip(energies, converges, strict=True)
+            ),
+        ],
         data={
             "fold": fold.energy,
             "fold_angle": fold.angle,
