@@ -26,7 +26,7 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
     first = int(np.flatnonzero(kinds != StrideKind.WALK)[0])
     step = record.during(first - 1)
     walked = record.state[step.stop, 0] - record.state[step.start, 0]
-    last_walk = kinds.size - 1 - int(np.argmax(kinds[::-1] != StrideKind.WALK))
+    rwt = kinds.tolist().index(StrideKind.RUN_TO_WALK)
     return {
         "completed": record.completed,
         "strides": kinds.size,
@@ -35,9 +35,9 @@ def summary(record: ScenarioRecord) -> dict[str, Any]:
         "speed_error_rms_running": float(np.sqrt(np.mean(error[running] ** 2))),
         "speed_error_max": float(np.max(np.abs(error))),
         "stiffness_at_5": float(np.mean(record.controls[top[-1], [Slot.K_SC, Slot.K_SD]])),
-        "rwt_apex": record.section_state[kinds.tolist().index(StrideKind.RUN_TO_WALK), :2].tolist(),
-        "rwt_vlo": record.section_state[kinds.tolist().index(StrideKind.RUN_TO_WALK) + 1].tolist(),
-        "walking_steps_after": int(kinds.size - 1 - last_walk),
+        "rwt_apex": record.section_state[rwt, :2].tolist(),
+        "rwt_vlo": record.section_state[rwt + 1].tolist(),
+        "walking_steps_after": int(np.argmax(kinds[::-1] != StrideKind.WALK)),
         "last_vlo": record.section_state[-1].tolist(),
         "energy_phase_walking": [float(phases[walking].min()), float(phases[walking].max())],
         "energy_phase_running": [float(phases[running].min()), float(phases[running].max())],

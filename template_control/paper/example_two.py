@@ -96,8 +96,8 @@ def states_figure(
     target: Array,
 ) -> Figure:
     """y, phi and E at VLO (steps + 1, 3) over the steps: a row a plant, a line a planner."""
-    size = {"height": 1.7 * len(plants) + 0.6, "width": 9.5}
-    figure, panels = panelled(rows=len(plants), columns=3, **size, sharex=True, sharey="col")
+    height = 1.7 * len(plants) + 0.6
+    figure, panels = panelled(height, len(plants), 3, 9.5, sharex=True, sharey="col")
     panels = panels.reshape(-1, 3)
     unit = np.array([1.0, 180.0 / np.pi, 1.0])
     spans = np.array(((0.96, 1.005), (-12.0, 6.0), (819.0, 832.0)))
@@ -259,13 +259,9 @@ def _texts(walk: Walk) -> tuple[str, ...]:
 
 
 def _numbers(walk: Walk) -> dict[str, Any]:
-    settled = walk.settled
-    return {
-        "steps": len(walk.states) - 1,
-        "fall": walk.fall or None,
-        "mean": None if settled is None else settled[0].tolist(),
-        "spread": None if settled is None else settled[1].tolist(),
-    }
+    mean, spread = (x.tolist() for x in walk.settled) if walk.settled else (None, None)
+    steps, fall = len(walk.states) - 1, walk.fall or None
+    return {"steps": steps, "fall": fall, "mean": mean, "spread": spread}
 
 
 def fig12(planners: Sequence[str] = tuple(PLANNERS), steps: int = STEPS) -> Reproduction:
