@@ -168,11 +168,9 @@ def study_figure(study: Study, result: SweepResult) -> Figure:
 
 def _heat_map(figure: Figure, axes: Axes, study: Study, values: Array) -> None:
     image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis")
-    first, second = study.grid
-    axes.set_ylabel(as_text(first))
-    axes.set_xlabel(as_text(second))
-    axes.set_yticks(range(values.shape[0]), [as_text(str(v)) for v in study.grid[first]])
-    axes.set_xticks(range(values.shape[1]), [as_text(str(v)) for v in study.grid[second]])
+    for axis, (name, given) in zip((axes.yaxis, axes.xaxis), study.grid.items(), strict=True):
+        axis.set_label_text(as_text(name))
+        axis.set_ticks(range(len(given)), [as_text(str(v)) for v in given])
     known = values[np.isfinite(values)]
     middle = 0.5 * (known.min() + known.max()) if known.size else 0.0
     for (row, column), value in np.ndenumerate(values):
