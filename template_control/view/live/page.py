@@ -26,8 +26,7 @@ _HEIGHT = 130  # of a plot [px]
 
 def first_push(p: SlipParameters) -> float:
     """Impulse of a push at first, to two digits, for a robot of this template [N s]."""
-    push = _PUSH * p.mass * p.speed_unit
-    return round(push, 1 - int(np.floor(np.log10(push))))
+    return float(f"{_PUSH * p.mass * p.speed_unit:.2g}")
 
 
 class Controls:
