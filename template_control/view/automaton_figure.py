@@ -116,8 +116,7 @@ def automaton_figure(automaton: Automaton) -> Figure:
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     x = y = low = 0.0
     for gait, names in gaits(automaton).items():
-        radius = _radius(len(names))
-        side = 2.0 * (radius + _AROUND)
+        side = 2.0 * (_radius(len(names)) + _AROUND)
         if x + side > _WIDTH:
             x, y = 0.0, low - _GAP
         _draw_gait(axes, automaton, gait, np.array([x + 0.5 * side, y - _TITLE - 0.5 * side]))

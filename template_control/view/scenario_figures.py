@@ -56,8 +56,7 @@ def _mark_footholds(axes: Axes, x: Array) -> None:
 
 def scenario_figure(record: ScenarioRecord) -> Figure:
     """CoM path with footholds, stiffness, touchdown angle and speed (Fig. 10a, b)."""
-    shares = {"height_ratios": [1.0, 1.2, 0.9, 1.1]}
-    figure, panels = panelled(7.2, 4, gridspec_kw=shares)
+    figure, panels = panelled(7.2, 4, gridspec_kw={"height_ratios": [1.0, 1.2, 0.9, 1.1]})
     path, stiffness, angle, speed = panels
     x, time = record.state[:, 0], record.time
     path.plot(x, record.state[:, 1], color=COM, linewidth=1.2, label="CoM")
