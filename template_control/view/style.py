@@ -124,11 +124,12 @@ def moment(value: float | None, default: float, last: float) -> float:
 
 
 def interval(
-    record: Record, start: float | None, end: float | None, default: tuple[float, float]
+    record: Record, start: float | None, end: float | None, part: tuple[float, float] | None = None
 ) -> tuple[float, float]:
-    """Part of a run between two :func:`moment` s, which is not empty [s]."""
+    """Part of a run between two :func:`moment` s, which is not empty [s]; by default all of it."""
     first, last = float(record.time[0]), float(record.time[-1])
-    begin, stop = moment(start, default[0], last), moment(end, default[1], last)
+    begin, stop = part or (first, last)
+    begin, stop = moment(start, begin, last), moment(end, stop, last)
     if not (first <= begin < stop):
         raise ParameterError(
             f"nothing lies between start {begin:g} s and end {stop:g} s: the run goes from"
@@ -158,11 +159,9 @@ class Look(Checked):
             record: the run.
             seconds: of the part that shows what the run is about; None: the whole run.
         """
-        last = float(record.time[-1])
-        whole = float(record.time[0]), last
         asked = self.start is not None or self.end is not None
-        default = whole if asked or seconds is None else telling(record, seconds)
-        begin, stop = interval(record, self.start, self.end, default)
+        part = None if asked or seconds is None else telling(record, seconds)
+        begin, stop = interval(record, self.start, self.end, part)
         first, after = np.searchsorted(record.time, (begin, stop + 1e-9)).tolist()
         first = min(first, max(after - 2, 0))
         return slice(first, after, 1 + (after - first) // _MOST_POINTS)

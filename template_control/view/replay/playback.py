@@ -47,8 +47,7 @@ def playback(
     check("speed", speed, Annotated[float, SPEEDS])
     check("fps", fps, Annotated[float, FRAME_RATES])
     record.check_shown()
-    whole = float(record.time[0]), float(record.time[-1])
-    begin, stop = interval(record, start, end, whole)
+    begin, stop = interval(record, start, end)
     duration = (stop - begin) / speed
     if duration * fps > _MOST_FRAMES:
         raise ParameterError(
