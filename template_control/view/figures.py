@@ -83,8 +83,7 @@ def stick_diagram(record: Record, look: Look = _LOOK) -> Figure:
     axes.plot(*record.com[rows].T, "o", color=COM, markersize=3.5, label="robot's CoM")
     low, high = axes.get_xlim()
     axes.plot(*np.transpose(record.ground.line(low, high)), color="0.3", linewidth=0.8)
-    axes.set(xlabel="x [m]", ylabel=f"{upward(record)} [m]", xlim=(low, high))
-    axes.set_aspect("equal")
+    axes.set(xlabel="x [m]", ylabel=f"{upward(record)} [m]", xlim=(low, high), aspect="equal")
     title = f"{as_text(record.robot_name)}, {time[0]:.2f} to {time[-1]:.2f} s"
     return finish(figure, [axes], title, look)
 
@@ -263,8 +262,7 @@ def pressure(record: SoleRecord, look: Look = _LOOK) -> Figure:
             seen = points[part, foot]
             axes.plot(seen[:, 1], seen[:, 0], ".", color=mark, markersize=2.0, label=phase)
         axes.plot(0.0, 0.0, "+", color="0.3", label="toe")
-        axes.set(xlabel="y, to the left [mm]", title=name)
-        axes.set_aspect("equal")
+        axes.set(xlabel="y, to the left [mm]", title=name, aspect="equal")
     panels[0].invert_xaxis()  # left is to the left; the axes are shared
     panels[0].set_ylabel("x, forward [mm]")
     return finish(figure, panels, f"{as_text(record.robot_name)}: centre of pressure", look)

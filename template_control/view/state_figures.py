@@ -189,9 +189,7 @@ def section_states(record: Record, look: Look = _LOOK) -> Figure:
     steps = np.arange(len(state))
     figure, panels = panelled(1.75 * len(shown), len(shown), sharex=True)
     for axes, (values, predicted, wanted, near, name) in zip(panels, shown, strict=True):
-        axes.step(
-            steps, wanted, where="mid", color=LEFT, linewidth=1.0, linestyle=":", label="target"
-        )
+        axes.step(steps, wanted, ":", where="mid", color=LEFT, linewidth=1.0, label="target")
         axes.plot(
             steps[1:], predicted, "x", color="0.55", markersize=4, label="expected by the planner"
         )
@@ -201,11 +199,9 @@ def section_states(record: Record, look: Look = _LOOK) -> Figure:
         axes.update_datalim([(0.0, wanted[0] - near), (0.0, wanted[0] + near)])
         axes.autoscale_view()
         axes.ticklabel_format(axis="y", useOffset=False)
-    if np.any(record.section_accepted[:-1] != target[1:, 0]):
-        panels[0].step(
-            steps[1:], record.section_accepted[:-1], where="mid", color=TRUNK, linewidth=1.0,
-            linestyle="--", label="accepted",
-        )  # fmt: skip
+    accepted, line = record.section_accepted[:-1], {"color": TRUNK, "linewidth": 1.0}
+    if np.any(accepted != target[1:, 0]):
+        panels[0].step(steps[1:], accepted, "--", where="mid", label="accepted", **line)
     far = np.flatnonzero(~record.section_nominal)
     if len(far):
         panels[0].plot(
