@@ -16,7 +16,7 @@ from template_control.slip.automaton.vocabulary import NUM_SLOTS, MapKind, Outco
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.view.style import panelled
+from template_control.view.style import LEFT, RIGHT, TRUNK, panelled
 
 _GRID = {"stiffness": 10, "angle": 21, "speed": 12, "height": 12}  # numbers of values
 
@@ -98,9 +98,6 @@ def _may_touch_down(p: SlipParameters, z: Array, u: Array) -> BoolArray:
     return np.asarray(VLO.energy(p, z, k) >= VLO.energy(p, at_rest, k))
 
 
-_COLORS = ("#db7321", "#2a6196", "#6b7078", "#3a9a4a")
-
-
 def error_figure(edges: Array, counts: Array, means: Mapping[str, Array]) -> Figure:
     """Mean errors [%] by map (2, b), binned over d_v with edges (b + 1,), and the runs' counts."""
     figure, panels = panelled(3.6, 1, 2)
@@ -112,7 +109,7 @@ def error_figure(edges: Array, counts: Array, means: Mapping[str, Array]) -> Fig
         bars.set_ylabel("runs")
         axes.set_zorder(bars.get_zorder() + 1)
         axes.patch.set_visible(False)
-        for color, (name, values) in zip(_COLORS, means.items(), strict=False):
+        for color, (name, values) in zip((RIGHT, LEFT, TRUNK), means.items(), strict=True):
             axes.plot(centres, values[panel], "o-", color=color, markersize=4, label=name)
         axes.set(xlabel="d_v", ylabel=label, yscale="log")
         axes.legend(loc="lower right")
