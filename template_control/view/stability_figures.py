@@ -11,22 +11,22 @@ from matplotlib.figure import Figure
 from template_control.arrays import Array, BoolArray, IntArray
 from template_control.checks.checked import checked
 from template_control.slip.gaits.branch import BranchPoint, Kind, Special
-from template_control.view.style import gallery, panelled
+from template_control.view.style import COM, LEFT, RIGHT, TRUNK, gallery, panelled
 
 _POINT: dict[str, Any] = {"marker": ".", "markersize": 3}
 _SPECIAL: dict[str, Any] = {"color": "black", "fillstyle": "none", "markersize": 5}
 _LOOKS: dict[Kind | Special, dict[str, Any]] = {
-    Kind.STABLE: {**_POINT, "color": "#2a6196"},
-    Kind.SADDLE: {**_POINT, "color": "#db7321"},
-    Kind.UNSTABLE: {**_POINT, "color": "#6b7078"},
-    Kind.NEUTRAL: {**_POINT, "color": "#3a9a4a"},
+    Kind.STABLE: {**_POINT, "color": LEFT},
+    Kind.SADDLE: {**_POINT, "color": RIGHT},
+    Kind.UNSTABLE: {**_POINT, "color": TRUNK},
+    Kind.NEUTRAL: {**_POINT, "color": COM},
     Special.FOLD: {**_SPECIAL, "marker": "D"},
     Special.SADDLE_NODE: {**_SPECIAL, "marker": "s"},
     Special.FLIP: {**_SPECIAL, "marker": "v"},
     Special.NEIMARK_SACKER: {**_SPECIAL, "marker": "o"},
 }
 _SPEED = "mean speed [m/s]"
-_MAPS = ("#db7321", "#2a6196", "#3a9a4a")
+_MAPS = (RIGHT, LEFT, COM)
 UNITS = {
     "energy": ("energy [J]", "E [J]", 1.0),
     "angle": ("touchdown angle [deg]", "alpha [deg]", 180.0 / np.pi),
@@ -97,7 +97,7 @@ def basin_figure(
             cmap="Greys", vmin=0, vmax=1.3 * steps.max(),
         )  # fmt: skip
         axes.contourf(
-            heights, angles, good.astype(float), levels=[0.5, 1.5], colors=["#2a6196"], alpha=0.85
+            heights, angles, good.astype(float), levels=[0.5, 1.5], colors=[LEFT], alpha=0.85
         )
         axes.set_title(f"{energy:.2f} J", fontsize=9)
     figure.supxlabel("y at VLO [m]", fontsize=10)

@@ -82,8 +82,7 @@ def _share_panel(axes: Axes, values: Array, trials: Sequence[Trial]) -> None:
     axes.tick_params(labelsize=8)
 
 
-_RATE, _STANDING, _POINT = "#2a6196", "0.6", "#db7321"
-_TEMPLATE = "#3d8a4f"
+_STANDING, _TEMPLATE = "0.6", "#3d8a4f"
 _LEVEL_COLUMNS = 5
 
 
@@ -104,10 +103,10 @@ def robustness_figure(found: Robustness) -> Figure:
         f"{as_text(found.robot)} in {found.plant}: success over {AFTER} steps", fontsize=10
     )
     marks = (
-        Line2D([], [], color=_RATE, marker="o", markersize=3.5, label="success"),
+        Line2D([], [], color=LEFT, marker="o", markersize=3.5, label="success"),
         Line2D([], [], color=_STANDING, label="no fall"),
-        Line2D([], [], color=_POINT, linestyle="--", label="breaking point"),
-        Patch(color=_RATE, alpha=0.15, label="95 % confidence"),
+        Line2D([], [], color=RIGHT, linestyle="--", label="breaking point"),
+        Patch(color=LEFT, alpha=0.15, label="95 % confidence"),
         Line2D([], [], color=_TEMPLATE, linestyle=":", label="the template alone"),
     )
     figure.legend(
@@ -123,12 +122,12 @@ def _level_panel(axes: Axes, finding: Finding) -> None:
         standing = [100.0 * level.standing for level in tried]
         axes.plot(levels, standing, ".-", color=_STANDING, linewidth=1.2)
     sure = 100.0 * np.array([level.interval for level in tried])
-    axes.fill_between(levels, *sure.T, color=_RATE, alpha=0.15, linewidth=0.0)
+    axes.fill_between(levels, *sure.T, color=LEFT, alpha=0.15, linewidth=0.0)
     rates = [100.0 * level.rate for level in tried]
-    axes.plot(levels, rates, "o-", color=_RATE, markersize=3.5, linewidth=1.2)
+    axes.plot(levels, rates, "o-", color=LEFT, markersize=3.5, linewidth=1.2)
     for level, color, style, width in (
         (finding.template or None, _TEMPLATE, ":", 1.2),
-        (finding.breaking_point, _POINT, "--", 1.0),
+        (finding.breaking_point, RIGHT, "--", 1.0),
     ):
         if level is not None:
             axes.axvline(d.unit.factor * level, color=color, linestyle=style, linewidth=width)
