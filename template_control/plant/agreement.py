@@ -58,7 +58,7 @@ def check_damping(robot: Biped, time_step: float) -> None:
 
 
 def trunk_corners(robot: PlanarBiped) -> Array:
-    """x and z (2, n) of the corners of boxes around the upright trunk's shapes [m]."""
+    """(n, 2) x and z of the corners of boxes around the upright trunk's shapes [m]."""
     geometry = pin.buildGeomFromUrdfString(robot.model, robot.urdf, pin.GeometryType.COLLISION)
     corners = []
     for shape in geometry.geometryObjects:
@@ -69,7 +69,7 @@ def trunk_corners(robot: PlanarBiped) -> Array:
         for corner in product(*zip(box.min_, box.max_, strict=True)):
             point = robot.trunk_axes @ shape.placement.act(np.array(corner))
             corners.append(point[[0, 2]])
-    return np.array(corners).reshape(-1, 2).T
+    return np.array(corners).reshape(-1, 2)
 
 
 def _bent(robot: Biped) -> Array:

@@ -67,12 +67,9 @@ class IdealPlant(OptionsPlant):
     def __init__(self, robot: PlanarBiped, options: IdealOptions) -> None:
         self.options = options
         model = robot.model.copy()
-        for joint in range(1, model.njoints):
-            inertia = model.inertias[joint]
-            scale = options.mass_scale
-            model.inertias[joint] = pin.Inertia(
-                scale * inertia.mass, inertia.lever, scale * inertia.inertia
-            )
+        scale = options.mass_scale
+        for joint, body in enumerate(robot.model.inertias):
+            model.inertias[joint] = pin.Inertia(scale * body.mass, body.lever, scale * body.inertia)
         same = robot.feet, robot.foot_radius
         self.robot = PlanarBiped(robot.path, robot.urdf, model, *same, groups=robot.groups)
         self.contacts: tuple[int, ...] = ()
@@ -87,7 +84,7 @@ class IdealPlant(OptionsPlant):
         self._impulse = self._nothing.copy()
         check_damping(self.robot, options.time_step)
         self._rubbing = np.flatnonzero(robot.joint_friction) + PLANAR_DOF
-        self._trunk_corners = tuple(trunk_corners(self.robot).T.tolist())
+        self._trunk_corners = trunk_corners(self.robot).tolist()
 
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`.
@@ -264,18 +261,16 @@ class IdealPlant(OptionsPlant):
         r = self.robot
         self._impulse += impulse
         self._see(q, v)
-        zero = np.zeros(r.nv)
         error = self._nothing.copy()
         for i in self.contacts:
             error[i] = self._feet.errors(i, q)
-        moved = np.abs(error).max() > _DRIFT
-        if moved:
-            q = q + solve(r.mass_matrix, zero, self._feet.rows()[0], error, self.contacts)[0]
+        if np.abs(error).max() > _DRIFT:
+            rows, _ = self._feet.rows()
+            q = q + solve(r.mass_matrix, np.zeros(r.nv), rows, error, self.contacts)[0]
             self._see(q, v)
         rows, _ = self._feet.rows()
         slip = rows[list(self.contacts)] @ v
         if slip.size and np.abs(slip).max() > _DRIFT:
-            momentum = r.mass_matrix @ v
-            v, _ = solve(r.mass_matrix, momentum, rows, self._nothing, self.contacts)
+            v, _ = solve(r.mass_matrix, r.mass_matrix @ v, rows, self._nothing, self.contacts)
             self._see(q, v)
         self._q, self._v = q, v

@@ -144,14 +144,14 @@ def with_balls(urdf: str, model: pin.Model, feet: Sequence[str], soles: Sequence
     return ET.tostring(robot, encoding="unicode")
 
 
-def sole_balls(urdf: str, model: pin.Model, foot: str) -> list[tuple[Array, float]]:
+def foot_balls(urdf: str, model: pin.Model, foot: str) -> list[tuple[Array, float]]:
     """Centres in the frame of a foot's joint [m] and radii [m] of the spheres it stands on."""
     geometry = pin.buildGeomFromUrdfString(model, urdf, pin.GeometryType.COLLISION)
     link = int(model.getFrameId(foot, pin.FrameType.BODY))
     return [
         (shape.placement.translation.copy(), float(shape.geometry.radius))
         for shape in geometry.geometryObjects
-        if shape.parentFrame == link
+        if shape.parentFrame == link and hasattr(shape.geometry, "radius")
     ]
 
 

@@ -120,7 +120,7 @@ def test_a_ball_in_pybullet_is_as_far_from_the_ground_as_is_told(robot, name):
 def test_a_foot_in_mujoco_is_as_far_from_the_ground_as_is_told(robot, name):
     ground = GROUNDS[name]
     plant = MujocoPlant(robot, tc.MujocoOptions(terrain=ground))
-    foot = plant.model.geom("foot0").id
+    foot = plant.model.geom("foot0_0").id
     shapes = [i for i in range(plant.model.ngeom) if plant.model.geom(i).bodyid[0] == 0]
     q = np.zeros(robot.nv)
     robot.update(q, q)
