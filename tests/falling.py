@@ -3,21 +3,17 @@
 import numpy as np
 import pinocchio as pin
 
-from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
+from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 
 DT = 1e-4  # [s]
 FALL = 0.1  # [s]
 FREE = {
-    "pybullet": (FloatingBaseBulletPlant, PlantOptions),
-    "mujoco": (FloatingBaseMujocoPlant, MujocoOptions),
-}
-PLANAR = {
     "pybullet": (BulletPlant, PlantOptions),
     "mujoco": (MujocoPlant, MujocoOptions),
-    "ideal": (IdealPlant, IdealOptions),
 }
+PLANAR = {**FREE, "ideal": (IdealPlant, IdealOptions)}
 
 
 def falls_as_pinocchio_says(robot, plant, seed=3):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, partial
+from functools import cache, partial
 from inspect import isbuiltin
 from pathlib import Path
 from typing import Any, ClassVar
@@ -24,7 +24,6 @@ from template_control.plant.c_library import decimal_points, silenced
 from template_control.plant.terrain import Terrain, pieces
 from template_control.plant.world import EnginePlant, WorldOptions
 from template_control.robot.biped import Biped
-from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
 from template_control.robot.urdf import mass_of, named
 from template_control.warm_up import Part, ready
@@ -89,6 +88,9 @@ class _World:
 class BulletPlant(EnginePlant):
     """A PyBullet world in DIRECT mode with its ground and one robot.
 
+    PyBullet has the state of a floating base link's CoM in its axes of inertia; the robot's is that
+    of the link's own frame.
+
     Args:
         robot: whose URDF to load and whose joint order to speak.
         options: friction, physics step, mass error, ground.
@@ -101,19 +103,22 @@ class BulletPlant(EnginePlant):
         joints: PyBullet's joint indices in the order of q.
     """
 
-    _held: ClassVar[bool] = True  # whether the base link is fixed to the world
-
     @checked
     def __init__(self, robot: Biped, options: PlantOptions) -> None:
         super().__init__(robot)
         self.robot, self.options = robot, options
+        self._floats = robot.base_dof == FLOATING_DOF
+        if self._floats:
+            ready(READ)
         self._world: Any = _World()
         self.client = self._world.id
         self._world.setGravity(0.0, 0.0, -robot.gravity)
         self._world.setTimeStep(options.time_step)
         self._ground = _ground_bodies(options.ground, self._world)
         try:
-            self.body = _load_body(robot, self._world, held=self._held)
+            self.body = _load_body(robot, self._world, held=not self._floats)
+            # The base link's axes of inertia in its own frame.
+            self._inertial = _pose(*self._world.getDynamicsInfo(self.body, _BASE)[3:5])
             count = self._world.getNumJoints(self.body)
             info = [self._world.getJointInfo(self.body, i) for i in range(count)]
             by_name = {row[1].decode(): row[0] for row in info}
@@ -128,8 +133,11 @@ class BulletPlant(EnginePlant):
             raise
         self._actuated = [by_name[name] for name in robot.joint_names]
         self._feet = {by_link[foot]: i for i, foot in enumerate(robot.feet)}
-        self._trunk = self.joints[PLANAR_DOF - 1] if self._held else _BASE
-        self._configure(range(_BASE, count))
+        self._trunk = _BASE if self._floats else self.joints[PLANAR_DOF - 1]
+        away = self._inertial.inverse()
+        self._away = np.ascontiguousarray(away.rotation), np.array(away.translation)
+        self._moving = np.zeros((5, 3))
+        self._configure()
 
     def _compare_masses(self, links: Mapping[str, int]) -> None:
         """Check that the robot weighs here what it weighs in its model."""
@@ -144,22 +152,22 @@ class BulletPlant(EnginePlant):
 
     def _mass_matrix(self, q: Array) -> Array:
         """PyBullet's (nv, nv) in the model's coordinates, at a configuration (nq,)."""
-        order = np.argsort(self.joints)
-        found = np.empty((self.robot.nv, self.robot.nv))
-        found[np.ix_(order, order)] = self._joint_space(q[order])
-        return found
+        nv, order = self.robot.nv, np.argsort(self.joints)
+        base, angles = nv - len(order), q[-len(order) :][order].tolist()
+        # PyBullet's base: angular velocity first, about its CoM in its axes of inertia.
+        places, found = [*_ANGULAR_FIRST[:base], *(base + order)], np.empty((nv, nv))
+        found[np.ix_(places, places)] = self._world.calculateMassMatrix(self.body, angles)
+        turned = np.eye(nv)
+        turned[:base, :base] = self._inertial.toActionMatrixInverse()[:base, :base]
+        return turned.T @ found @ turned
 
-    def _joint_space(self, q: Array) -> Array:
-        """The same in PyBullet's own coordinates; ``q`` holds the joints in its own order."""
-        return np.array(self._world.calculateMassMatrix(self.body, q.tolist()))
-
-    def _configure(self, links: Iterable[int]) -> None:
+    def _configure(self) -> None:
         p, body, scale = self._world, self.body, self.options.mass_scale
         damping = dict(zip(self._actuated, self.robot.joint_damping, strict=True))
         # One property a call: a combined call silently drops some of them.
         for ground in self._ground:
             p.changeDynamics(ground, -1, restitution=0.0)
-        for link in links:
+        for link in range(_BASE, p.getNumJoints(body)):
             for name, value in (
                 ("restitution", 0.0),
                 ("linearDamping", 0.0),
@@ -169,8 +177,7 @@ class BulletPlant(EnginePlant):
             ):
                 p.changeDynamics(body, link, **{name: value})
             if scale != 1.0:
-                dynamics = p.getDynamicsInfo(body, link)
-                mass, inertia = dynamics[0], dynamics[2]
+                mass, _, inertia, *_ = p.getDynamicsInfo(body, link)
                 p.changeDynamics(body, link, mass=mass * scale)
                 p.changeDynamics(body, link, localInertiaDiagonal=[i * scale for i in inertia])
         dry = dict(zip(self._actuated, self.robot.joint_friction, strict=True))
@@ -195,14 +202,35 @@ class BulletPlant(EnginePlant):
     def reset(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.reset`."""
         self._stale = True
-        for joint, position, velocity in zip(self.joints, q, v, strict=True):
+        count = len(self.joints)
+        for joint, position, velocity in zip(self.joints, q[-count:], v[-count:], strict=True):
             self._world.resetJointState(self.body, joint, position, velocity)
+        if self._floats:
+            self._reset_trunk(q, v)
+
+    def _reset_trunk(self, q: Array, v: Array) -> None:
+        trunk = _pose(q[:3], q[3:_POSITION])
+        place = trunk * self._inertial
+        quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
+        self._world.resetBasePositionAndOrientation(
+            self.body, place.translation.tolist(), quaternion
+        )
+        linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:FLOATING_DOF]
+        linear = linear + np.cross(angular, place.translation - trunk.translation)
+        self._world.resetBaseVelocity(self.body, linear.tolist(), angular.tolist())
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
-        for i, state in enumerate(self._world.getJointStates(self.body, self.joints)):
-            q[i] = state[0]
-            v[i] = state[1]
+        p, count, moving = self._world, len(self.joints), self._moving
+        angles, speeds = q[-count:], v[-count:]
+        for i, state in enumerate(p.getJointStates(self.body, self.joints)):
+            angles[i] = state[0]
+            speeds[i] = state[1]
+        if self._floats:
+            place = p.getBasePositionAndOrientation(self.body)
+            read_trunk(place, p.getBaseVelocity(self.body), *self._away, q, moving)
+            np.matmul(moving[:3], moving[3], out=v[:3])
+            np.matmul(moving[:3], moving[4], out=v[3:FLOATING_DOF])
 
     def _find_contacts(self) -> None:
         """See :class:`~.world.EnginePlant`.
@@ -218,10 +246,10 @@ class BulletPlant(EnginePlant):
             if foot is None:
                 self._trunk_lies = self._trunk_lies or link == self._trunk
                 continue
-            # Normal force and direction (a wall pushes sideways), two of friction.
-            normal, along, across = sign * contact[9], sign * contact[10], sign * contact[12]
-            up, ahead, left = contact[7], contact[11], contact[13]
-            force = [normal * up[i] + along * ahead[i] + across * left[i] for i in axes]
+            # Forces along the normal (a wall's is level) and two directions of friction.
+            normal, one, other = sign * contact[9], sign * contact[10], sign * contact[12]
+            out, slip, across = contact[7], contact[11], contact[13]
+            force = [normal * out[i] + one * slip[i] + other * across[i] for i in axes]
             if rows == PATCH:
                 force += moment(contact[6], force)
             for i, part in enumerate(force):
@@ -242,60 +270,6 @@ class BulletPlant(EnginePlant):
     def close(self) -> None:
         """Disconnect; the plant is unusable afterwards."""
         self._world.disconnect()
-
-
-class FloatingBaseBulletPlant(BulletPlant):
-    """As :class:`BulletPlant`, for a floating-base robot.
-
-    PyBullet has the state of the base link's CoM in its axes of inertia; the robot's is that of the
-    link's own frame.
-    """
-
-    _held = False
-
-    def __init__(self, robot: FloatingBaseBiped, options: PlantOptions) -> None:
-        ready(READ)
-        super().__init__(robot, options)
-        away = self._inertial.inverse()
-        self._away = np.ascontiguousarray(away.rotation), np.array(away.translation)
-        self._moving = np.zeros((5, 3))
-
-    @cached_property
-    def _inertial(self) -> pin.SE3:
-        """The base link's axes of inertia in its own frame."""
-        found = self._world.getDynamicsInfo(self.body, _BASE)
-        return _pose(found[3], found[4])
-
-    def _mass_matrix(self, q: Array) -> Array:
-        # PyBullet's base: angular velocity first, about its CoM in its axes of inertia.
-        order = np.argsort(self.joints)
-        place = np.concatenate((_ANGULAR_FIRST, FLOATING_DOF + order))
-        found, turned = np.empty((self.robot.nv, self.robot.nv)), np.eye(self.robot.nv)
-        found[np.ix_(place, place)] = self._joint_space(q[_POSITION:][order])
-        turned[:FLOATING_DOF, :FLOATING_DOF] = self._inertial.toActionMatrixInverse()
-        return turned.T @ found @ turned
-
-    def reset(self, q: Array, v: Array) -> None:
-        """See :meth:`~.plant.Plant.reset`."""
-        super().reset(q[_POSITION:], v[FLOATING_DOF:])
-        trunk = _pose(q[:3], q[3:_POSITION])
-        place = trunk * self._inertial
-        quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
-        self._world.resetBasePositionAndOrientation(
-            self.body, place.translation.tolist(), quaternion
-        )
-        linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:FLOATING_DOF]
-        linear = linear + np.cross(angular, place.translation - trunk.translation)
-        self._world.resetBaseVelocity(self.body, linear.tolist(), angular.tolist())
-
-    def read(self, q: Array, v: Array) -> None:
-        """See :meth:`~.plant.Plant.read`."""
-        super().read(q[_POSITION:], v[FLOATING_DOF:])
-        place = self._world.getBasePositionAndOrientation(self.body)
-        velocity, moving = self._world.getBaseVelocity(self.body), self._moving
-        read_trunk(place, velocity, *self._away, q, moving)
-        np.matmul(moving[:3], moving[3], out=v[:3])
-        np.matmul(moving[:3], moving[4], out=v[3:FLOATING_DOF])
 
 
 def _load_body(robot: Biped, world: Any, held: bool) -> int:

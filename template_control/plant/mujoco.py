@@ -87,9 +87,9 @@ class MujocoPlant(EnginePlant):
             raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
         self.data = engine.MjData(self.model)
         # Joints of one number each: all of a planar robot's, but not a floating base.
-        floats = robot.directions > UP
-        joints = [self.model.joint(n) for n in list(robot.model.names)[2 if floats else 1 :]]
-        place, speed = (_PLACE, _SPEED) if floats else ([], [])
+        self._floats = robot.directions > UP
+        joints = [self.model.joint(n) for n in list(robot.model.names)[2 if self._floats else 1 :]]
+        place, speed = (_PLACE, _SPEED) if self._floats else ([], [])
         self._q = np.array([*place, *(joint.qposadr[0] for joint in joints)])
         self._v = np.array([*speed, *(joint.dofadr[0] for joint in joints)])
         self._actuated = self._v[-len(robot.joint_names) :]
@@ -126,10 +126,14 @@ class MujocoPlant(EnginePlant):
         self._stale = True
         self._engine.mj_resetData(self.model, self.data)
         self.data.qpos[self._q], self.data.qvel[self._v] = q, v
+        if self._floats:  # MuJoCo has the trunk's velocity in the world
+            self.data.qvel[:3] = pin.Quaternion(q[3:7]).matrix() @ v[:3]
 
     def read(self, q: Array, v: Array) -> None:
         """See :meth:`~.plant.Plant.read`."""
         q[:], v[:] = self.data.qpos[self._q], self.data.qvel[self._v]
+        if self._floats:
+            v[:3] = pin.Quaternion(q[3:7]).matrix().T @ self.data.qvel[:3]
 
     def _find_contacts(self) -> None:
         """See :class:`~.world.EnginePlant`."""
@@ -156,20 +160,3 @@ class MujocoPlant(EnginePlant):
         self.data.qfrc_applied[self._actuated] = torque
         self.data.xfrc_applied[self._trunk, :2] = push, left  # at the body's centre of mass
         self._engine.mj_step(self.model, self.data)
-
-
-class FloatingBaseMujocoPlant(MujocoPlant):
-    """As :class:`MujocoPlant`, for a floating-base robot.
-
-    MuJoCo has the trunk's velocity in the world and its angular velocity in the trunk's axes.
-    """
-
-    def reset(self, q: Array, v: Array) -> None:
-        """See :meth:`~.plant.Plant.reset`."""
-        super().reset(q, v)
-        self.data.qvel[:3] = pin.Quaternion(q[3:7]).matrix() @ v[:3]
-
-    def read(self, q: Array, v: Array) -> None:
-        """See :meth:`~.plant.Plant.read`."""
-        super().read(q, v)
-        v[:3] = pin.Quaternion(q[3:7]).matrix().T @ self.data.qvel[:3]

@@ -11,9 +11,9 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.checks.checked import checked
 from template_control.errors import ParameterError
-from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
+from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.plant.world import WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
@@ -139,12 +139,12 @@ def robot_in(world: WorldOptions, robot: R) -> R:
     return own if gravity == own.gravity else own.changed(gravity)
 
 
-_PLANTS: dict[type, tuple[Any, Any]] = {
-    IdealOptions: (IdealPlant, None),
-    MujocoOptions: (MujocoPlant, FloatingBaseMujocoPlant),
-    PlantOptions: (BulletPlant, FloatingBaseBulletPlant),
+_PLANTS: dict[type, Any] = {
+    IdealOptions: IdealPlant,
+    MujocoOptions: MujocoPlant,
+    PlantOptions: BulletPlant,
 }
-"""By its options, the plant of a planar and of a floating-base robot."""
+"""Plants by their options."""
 
 
 @checked
@@ -161,12 +161,10 @@ def open_plant(robot: Biped, world: World) -> AbstractContextManager[Plant]:
     """
     if not isinstance(world, WorldOptions):
         return nullcontext(world)
-    planar, floating = next(of for kind, of in _PLANTS.items() if isinstance(world, kind))
-    made = floating if isinstance(robot, FloatingBaseBiped) else planar
-    if made is None:
+    made = next(plant for kind, plant in _PLANTS.items() if isinstance(world, kind))
+    if made is IdealPlant and isinstance(robot, FloatingBaseBiped):
         raise ParameterError(
             f"{robot.name} has a floating base, and the plant is {plant_name(world)}: give"
             " PlantOptions or MujocoOptions"
         )
-    found: AbstractContextManager[Plant] = made(robot_in(world, robot), world)
-    return found
+    return made(robot_in(world, robot), world)

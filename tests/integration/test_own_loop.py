@@ -8,7 +8,7 @@ import pytest
 import template_control as tc
 from template_control.embedding.options import FREE_PLANNER
 from template_control.errors import ParameterError
-from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.robot.start import state_at_vlo
 from template_control.run.experiment import Experiment
 from template_control.run.record import FloatingRecord
@@ -58,7 +58,7 @@ def floating():
     options = Experiment(robot, planner=planner).prepare()
     controller = tc.EmbeddingController(robot, planner, options.tuning)
     q, v = start(controller, options)
-    with FloatingBaseBulletPlant(robot, PlantOptions()) as plant:
+    with BulletPlant(robot, PlantOptions()) as plant:
         return looped(controller, plant, q, v)
 
 

@@ -9,8 +9,8 @@ import pytest
 import template_control as tc
 from template_control.cli.experiment_options import experiment_from
 from template_control.errors import ParameterError
-from template_control.plant.bullet import FloatingBaseBulletPlant
-from template_control.plant.mujoco import FloatingBaseMujocoPlant
+from template_control.plant.bullet import BulletPlant
+from template_control.plant.mujoco import MujocoPlant
 from template_control.run.hand import plant_force
 
 FORCE = (8.0, -5.0)  # [N] along x and y
@@ -24,8 +24,8 @@ def bolt():
 @pytest.mark.parametrize(
     "plant_of",
     [
-        lambda robot: FloatingBaseBulletPlant(robot, tc.PlantOptions()),
-        lambda robot: FloatingBaseMujocoPlant(robot, tc.MujocoOptions()),
+        lambda robot: BulletPlant(robot, tc.PlantOptions()),
+        lambda robot: MujocoPlant(robot, tc.MujocoOptions()),
     ],
     ids=("pybullet", "mujoco"),
 )

@@ -19,8 +19,8 @@ if comma:
     locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
 import template_control as tc
 from template_control.robot import load_floating_robot
-from template_control.plant.bullet import FloatingBaseBulletPlant
-from template_control.plant.mujoco import FloatingBaseMujocoPlant
+from template_control.plant.bullet import BulletPlant
+from template_control.plant.mujoco import MujocoPlant
 
 def points():
     buffer = ctypes.create_string_buffer(32)
@@ -39,8 +39,8 @@ for world in worlds:
     found[world.kind] = [record.steps, bits]
 free = load_floating_robot("bolt")
 for plant in (
-    FloatingBaseBulletPlant(free, tc.PlantOptions()),
-    FloatingBaseMujocoPlant(free, tc.MujocoOptions()),
+    BulletPlant(free, tc.PlantOptions()),
+    MujocoPlant(free, tc.MujocoOptions()),
 ):
     q, v, force = free.neutral(), np.zeros(free.nv), np.zeros((2, 3))
     q[2], felt = 0.5, []

@@ -8,9 +8,9 @@ from other_frames import rewritten
 
 from template_control.embedding.planners.lqr import LqrPlanner
 from template_control.errors import RobotError
-from template_control.plant.bullet import BulletPlant, FloatingBaseBulletPlant, PlantOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.ideal import IdealOptions, IdealPlant
-from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions, MujocoPlant
+from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import robot_path
 from template_control.robot.planar_biped import PlanarBiped
@@ -28,10 +28,7 @@ PLANTS = {
     "pybullet": (BulletPlant, PlantOptions()),
     "mujoco": (MujocoPlant, MujocoOptions()),
 }
-FREE_PLANTS = {
-    "pybullet": (FloatingBaseBulletPlant, PlantOptions()),
-    "mujoco": (FloatingBaseMujocoPlant, MujocoOptions()),
-}
+FREE_PLANTS = {name: PLANTS[name] for name in ("pybullet", "mujoco")}
 
 
 class Words:

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 from template_control.errors import ParameterError, RobotError
-from template_control.plant.bullet import FloatingBaseBulletPlant, PlantOptions, pybullet
-from template_control.plant.mujoco import FloatingBaseMujocoPlant, MujocoOptions
+from template_control.plant.bullet import BulletPlant, PlantOptions, pybullet
+from template_control.plant.mujoco import MujocoOptions, MujocoPlant
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import FLOATING_ROBOTS, load_floating_robot, robot_path
 from template_control.robot.start import Pose, floating_state_in
@@ -37,7 +37,7 @@ def states(robot, count=10):
 
 def integrated(plant):
     """(3,) the point of the trunk whose velocity the engine integrates, in its frame [m]."""
-    if isinstance(plant, FloatingBaseMujocoPlant):
+    if isinstance(plant, MujocoPlant):
         return np.zeros(3)
     told = pybullet().getDynamicsInfo(plant.body, -1, physicsClientId=plant.client)
     return np.array(told[3])
@@ -71,8 +71,8 @@ def model_acceleration(robot, q, v, torque, point):
 PLANTS = pytest.mark.parametrize(
     "plant_of",
     [
-        lambda robot: FloatingBaseBulletPlant(robot, PlantOptions()),
-        lambda robot: FloatingBaseMujocoPlant(robot, MujocoOptions()),
+        lambda robot: BulletPlant(robot, PlantOptions()),
+        lambda robot: MujocoPlant(robot, MujocoOptions()),
     ],
     ids=("pybullet", "mujoco"),
 )
