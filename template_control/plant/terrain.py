@@ -331,25 +331,20 @@ def _lines(terrain: Terrain) -> list[tuple[_Point, _Point, float | None]]:
     return found
 
 
-KINDS: dict[str, dict[str, Any]] = {
-    "flat": {},
-    "step": {"height": Height, "x": Start},
-    "stairs": {"rise": Height, "run": Positive, "count": Count, "start": Start},
-    "slope": {"angle": Annotated[float, Range(-45.0, 45.0)], "start": Start, "length": Positive},
-    "random": {
-        "height": NotNegative, "shortest": Positive, "longest": Positive, "seed": Index,
-        "start": Start, "end": Start,
-    },
+_Degrees = Annotated[float, Range(-45.0, 45.0)]
+KINDS: dict[str, tuple[Callable[..., Terrain], dict[str, Any]]] = {
+    "flat": (Terrain.flat, {}),
+    "step": (Terrain.step, {"height": Height, "x": Start}),
+    "stairs": (Terrain.stairs, {"rise": Height, "run": Positive, "count": Count, "start": Start}),
+    "slope": (Terrain.slope, {"angle": _Degrees, "start": Start, "length": Positive}),
+    "random": (
+        Terrain.random_steps,
+        {"height": NotNegative, "shortest": Positive, "longest": Positive, "seed": Index,
+         "start": Start, "end": Start},
+    ),
 }  # fmt: skip
-"""Numbers of each kind of terrain on the command line; angles are in degrees."""
+"""Each kind of terrain on the command line, and its numbers; angles are in degrees."""
 
-_MAKERS: dict[str, Callable[..., Terrain]] = {
-    "flat": Terrain.flat,
-    "step": Terrain.step,
-    "stairs": Terrain.stairs,
-    "slope": Terrain.slope,
-    "random": Terrain.random_steps,
-}
 _SHORTEST, _LONGEST = 0.3, 0.6  # of random treads [m]
 
 
@@ -374,18 +369,19 @@ def terrain_from(text: str) -> Terrain:
             " step:height=0.03,x=2.5, or a file .toml, .csv or .txt"
         )
     where = f"terrain {text!r}"
-    known = ", ".join(KINDS[kind]) or "no number"
+    make, numbers = KINDS[kind]
+    known = ", ".join(numbers) or "no number"
     given: dict[str, Any] = {}
     for key, value in entries(where, filter(None, rest.split(",")), "NAME=NUMBER").items():
-        if key not in KINDS[kind]:
+        if key not in numbers:
             raise ParameterError(f"{where}: {kind} takes {known}, and not {key!r}")
-        given[key] = number(f"{where}: {key}", value, KINDS[kind][key])
+        given[key] = number(f"{where}: {key}", value, numbers[key])
     if "angle" in given:
         given["angle"] = radians(given["angle"])
     if "shortest" in given or "longest" in given:
         given["length"] = (given.pop("shortest", _SHORTEST), given.pop("longest", _LONGEST))
     try:
-        return _MAKERS[kind](**given)
+        return make(**given)
     except TypeError:
         raise ParameterError(
             f"{where} lacks a number: {kind} takes {known}, such as step:height=0.03,x=2.5"

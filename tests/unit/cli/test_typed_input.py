@@ -128,9 +128,9 @@ def test_a_wrong_value_is_named_as_it_was_typed(line, told, refused, tmp_path, m
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize("kind", [kind for kind, keys in KINDS.items() if keys])
+@pytest.mark.parametrize("kind", [kind for kind, (_, keys) in KINDS.items() if keys])
 def test_every_key_of_every_terrain_is_taken_once(kind):
-    for key in KINDS[kind]:
+    for key in KINDS[kind][1]:
         with pytest.raises(ParameterError, match=f"{key} is given twice"):
             terrain_from(f"{kind}:{key}=1,{key}=2")
 
