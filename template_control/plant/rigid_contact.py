@@ -106,10 +106,7 @@ class RollingFeet:
     def rows(self) -> tuple[Array, Array]:
         """Jacobians (n, 2, nv) of the points that touch, along and out of planes, and dJ/dt v."""
         r = self._robot
-        found: tuple[Array, Array] = _rows(
-            self._axes, r.foot_radius, r.contact_jacobian, r.foot_turning, r.contact_bias
-        )
-        return found
+        return _rows(self._axes, r.foot_radius, r.contact_jacobian, r.foot_turning, r.contact_bias)
 
     def errors(self, foot: int, q: Array) -> Array:
         """(2,) distance of a foot from where it holds, along and out of its plane [m]."""
@@ -121,13 +118,13 @@ class RollingFeet:
 
     def _centre(self, foot: int) -> Array:
         r = self._robot
-        return np.asarray(r.contact_position[foot] + (0.0, r.foot_radius))
+        return r.contact_position[foot] + (0.0, r.foot_radius)
 
     def _held(self, foot: int, q: Array) -> Array:
         """(2,) a sphere's centre along its plane, less what it rolled, and out of it [m]."""
         r = self._robot
         rolled = r.foot_radius * float(r.foot_turning[foot] @ q)
-        return np.asarray(self._axes[foot] @ self._centre(foot) - (rolled, 0.0))
+        return self._axes[foot] @ self._centre(foot) - (rolled, 0.0)
 
 
 @compiled
