@@ -17,11 +17,12 @@ _COLOURS = (
 # Colour of a side's leg, and its place over the hips' distance.
 _SIDES = {"left": ("blue", 0.5), "right": ("orange", -0.5)}
 _BALL = 0.4  # moment of inertia of a ball, over its mass and the square of its radius
-_BASE = (
+PLANAR_BASE = (
     ("base_x", "prismatic", "world", "slide_x", "1 0 0"),
     ("base_z", "prismatic", "slide_x", "slide_z", "0 0 1"),
     ("base_pitch", "revolute", "slide_z", "trunk", "0 1 0"),
 )
+"""Joints that hold a trunk in its plane: names, kinds, parents, children and axes."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +123,7 @@ class FiveLink(Checked):
         if block is None:
             held = (f'<link name="{name}">{_MASSLESS}</link>' for name in ("slide_x", "slide_z"))
             links = ['<link name="world"/>', *held, *links]
-            joints = [_joint(*row, limit=(-1e3, 1e3, 0.0, 1e3)) for row in _BASE]
+            joints = [_joint(*row, limit=(-1e3, 1e3, 0.0, 1e3)) for row in PLANAR_BASE]
         (hip, knee), speed, lateral = self.torque_limit, self.velocity_limit, "0 1 0"
         hip_limit, knee_limit = (*self.hip_range, hip, speed), (*self.knee_range, knee, speed)
         bend, end = f"0 0 {-thigh.length:g}", f"0 0 {-shank.length:g}"

@@ -25,6 +25,7 @@ from template_control.checks.checked import checked
 from template_control.errors import RobotError
 from template_control.robot import urdf_edits
 from template_control.robot.biped import MONOPOD, SINGLE, Biped
+from template_control.robot.five_link import PLANAR_BASE
 from template_control.robot.legs import is_lateral
 from template_control.robot.requirements import add_feet, check_planar, check_planar_legs
 from template_control.robot.terms import PLANAR_DOF, gather_planar
@@ -32,12 +33,6 @@ from template_control.robot.urdf import build_model, check_bodies, end_of, named
 from template_control.structured import keep
 
 _PITCH = 2  # place of the trunk's pitch in q
-_BASE = (
-    ("base_x", "prismatic", "1 0 0"),
-    ("base_z", "prismatic", "0 0 1"),
-    ("base_pitch", "revolute", "0 1 0"),
-)
-_WORLD = ("world", "slide_x", "slide_z")
 _SAGITTAL = 4  # joints that stay
 _HINGES = ("revolute", "continuous")
 
@@ -182,12 +177,12 @@ def planarise(
     urdf_edits.take_points(path, robot)
     _shift(robot, root, hips)
     urdf_edits.spheres(path, robot, feet, foot_radius, foot_offset)
-    links = _free(_WORLD, named(robot, "link"))
+    bases, kinds, parents, _, axes = zip(*PLANAR_BASE, strict=True)
+    names, links = _free(bases, joints), _free(parents, named(robot, "link"))
     for link in links:
         ET.SubElement(robot, "link", name=link)
-    names = _free([name for name, _, _ in _BASE], joints)
-    rows = zip(names, _BASE, links, (*links[1:], root), strict=True)
-    for name, (_, kind, axis), parent, child in rows:
+    rows = zip(names, kinds, links, (*links[1:], root), axes, strict=True)
+    for name, kind, parent, child, axis in rows:
         joint = ET.SubElement(robot, "joint", name=name, type=kind)
         ET.SubElement(joint, "parent", link=parent)
         ET.SubElement(joint, "child", link=child)
