@@ -13,7 +13,6 @@ from template_control.arrays import Array
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Pair, Range, Shape, Triple, Vector
 from template_control.errors import ParameterError, RobotError
-from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
@@ -24,6 +23,8 @@ _LONGEST = 0.2  # the same, of a floating-base robot [rad, m]
 _EXACT = 1e-12  # [m, rad]
 
 AnyBiped = TypeVar("AnyBiped", PlanarBiped, FloatingBaseBiped)
+# By a configuration, what a robot misses of a pose at its last update, and its Jacobian.
+Missed = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -191,24 +192,24 @@ def _bent_to(
 
 
 def _newton(
-    robot: Biped,
+    robot: AnyBiped,
     q: Array,
-    error: Callable[[Array], Array],
-    step: Callable[[Array, Array], Array],
+    missed: Missed,
+    solve: Callable[[AnyBiped, Array, Array], Array],
     longest: float,
     iterations: int,
 ) -> Array | None:
-    """(nq,) configuration at which ``error`` is zero, by Newton's method; None if none is found.
+    """(nq,) configuration at which nothing is ``missed``, by Newton's method; None: not found.
 
-    ``step`` (nv,) takes the error away; ``longest`` is its largest change of a coordinate.
+    ``solve`` finds the step (nv,); ``longest`` is its largest change of a coordinate.
     """
     rest = np.zeros(robot.nv)
     for _ in range(iterations):
         robot.update(q, rest)
-        away = error(q)
+        away, rows = missed(q)
         if np.max(np.abs(away)) < _EXACT:
             return q
-        change = step(q, away)
+        change = solve(robot, rows, -away)
         q = robot.moved(q, change * min(1.0, longest / np.max(np.abs(change))))
     return None
 
@@ -218,17 +219,14 @@ def _planar_configuration(robot: PlanarBiped, pose: Pose, q: Array, longest: flo
     feet, wanted = _feet(robot, pose, pose.feet)
     q[:PLANAR_DOF] = pose.com[0], 0.8 * pose.com[1], pose.pitch
 
-    def error(q: Array) -> Array:
+    def missed(q: Array) -> tuple[Array, Array]:
         away = (robot.foot_position[feet] - wanted).ravel()
-        return np.concatenate((robot.com - pose.com, [q[2] - pose.pitch], away))
-
-    def step(_: Array, error: Array) -> Array:
         rows = _placing_rows(robot, feet)
         # The lowest point's path, not that of the material point which touches there.
         rows[3::2] += robot.foot_radius * robot.foot_turning[feet]
-        return _solved(robot, rows, -error)
+        return np.concatenate((robot.com - pose.com, [q[2] - pose.pitch], away)), rows
 
-    return _newton(robot, q, error, step, longest, 50)
+    return _newton(robot, q, missed, _solved, longest, 50)
 
 
 def _placing_rows(robot: PlanarBiped, feet: Sequence[int]) -> Array:
@@ -255,24 +253,21 @@ def _floating_configuration(
     feet = _by_contact(robot, pose, pose.feet)
     feet[:, :2] += robot.spread
 
-    def error(_: Array) -> Array:
+    def missed(q: Array) -> tuple[Array, Array]:
         turn = pin.log3(robot.rotation @ upright.T)
         away = robot.contact_position - feet
         if robot.patches:
             axes = robot.data["contact_axes"][0, : len(feet)]
             away = np.hstack((away, [pin.log3(turned) for turned in axes]))
-        return np.concatenate((robot.space.com - pose.com, turn, away.ravel()))
-
-    def step(q: Array, error: Array) -> Array:
         rows, r = robot.placing_rows(), robot.foot_radius
         # The lowest point's path, not that of the material point which touches there.
         for foot in range(len(robot.feet) if r > 0.0 else 0):
             turning = _foot_turning(robot, q, foot)
             rows[6 + 3 * foot] += r * turning[1]
             rows[7 + 3 * foot] -= r * turning[0]
-        return robot.smallest_motion(rows, -error)
+        return np.concatenate((robot.space.com - pose.com, turn, away.ravel())), rows
 
-    return _newton(robot, q, error, step, longest, 100)
+    return _newton(robot, q, missed, FloatingBaseBiped.smallest_motion, longest, 100)
 
 
 def _by_contact(robot: FloatingBaseBiped, pose: Pose, values: Array) -> Array:
@@ -288,7 +283,7 @@ def _foot_turning(robot: FloatingBaseBiped, q: Array, foot: int) -> Array:
     data = robot.model.createData()
     frame = foot_frame(robot.model, robot.feet[foot])
     world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    return np.asarray(pin.computeFrameJacobian(robot.model, data, q, frame, world)[3:])
+    return pin.computeFrameJacobian(robot.model, data, q, frame, world)[3:]
 
 
 def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:
