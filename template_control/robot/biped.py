@@ -171,7 +171,10 @@ class Biped(Robot):
         self._look()
         self.spread: Array = np.zeros((len(feet), 2))
         self._prepare()
-        self.half_length, self.half_width = self._half_sides()
+        sides = [patch.half_sides - np.abs(patch.centre) for patch in patches] or [
+            0.5 * np.ptp(self.spread[list(group)], axis=0) for group in groups if group
+        ]
+        self.half_length, self.half_width = np.min(sides, axis=0).tolist()
 
     def _take_patches(self) -> None:
         """Write what is constant of the soles, and let the knees stop where the leg is straight.
@@ -226,14 +229,6 @@ class Biped(Robot):
     def paired(self) -> bool:
         """Whether the feet of the template's legs are groups of contacts, as a quadruped's."""
         return any(len(group) > 1 for group in self.groups)
-
-    def _half_sides(self) -> tuple[float, float]:
-        """``half_length`` and ``half_width``."""
-        sides = [patch.half_sides - np.abs(patch.centre) for patch in self.patches] or [
-            0.5 * np.ptp(self.spread[list(group)], axis=0) for group in self.groups if group
-        ]
-        length, width = np.min(sides, axis=0).tolist()
-        return length, width
 
     @property
     def foot_jacobian(self) -> Array:
@@ -295,11 +290,11 @@ class Biped(Robot):
             backward: bend them the other way.
         """
         q = self.neutral()
-        for joints in self._hinges:
-            places = [self.model.idx_qs[joint] for joint in joints]
-            sign = self.joint_sign[[self.model.idx_vs[joint] - self.base_dof for joint in joints]]
-            ahead = sign[_KNEE] * (middle(self.model, joints[_KNEE]) - q[places[_KNEE]]) >= 0.0
-            q[places] += (1.0 if ahead != backward else -1.0) * sign * _BENT[: len(joints)]
+        angles = q[-len(self.joint_names) :]
+        for own, (_, knee, *_) in zip(map(list, self.hinges), self._hinges, strict=True):
+            sign = self.joint_sign[own]
+            ahead = sign[_KNEE] * (middle(self.model, knee) - angles[own[_KNEE]]) >= 0.0
+            angles[own] += (1.0 if ahead != backward else -1.0) * sign * _BENT[: len(own)]
         return q
 
     def moved(self, q: Array, step: Array) -> Array:
@@ -309,7 +304,7 @@ class Biped(Robot):
             q: (nq,) configuration.
             step: (nv,) the motion, in the coordinates of the velocity [m, rad].
         """
-        return np.asarray(pin.integrate(self.model, q, step))
+        return pin.integrate(self.model, q, step)
 
     @abstractmethod
     def hip_height(self, q: Array) -> float:

@@ -234,15 +234,9 @@ class FloatingBaseBiped(Biped):
         return cls(path, urdf, model, tuple(feet), radius, walk, groups=legs)
 
     def update(self, q: Array, v: Array) -> None:
-        """See :meth:`~template_control.robot.biped.Biped.update`.
+        """See :meth:`~.robot.Robot.update`; the quaternion (x, y, z, w) is made as long as 1.
 
-        Args:
-            q: (nq,) configuration; its quaternion (x, y, z, w) is made as long as 1 if its length
-                is so to 1e-3. ``q`` itself stays as it is.
-            v: (nv,) velocity.
-
-        Raises:
-            ParameterError: if a value is NaN or infinite, or the quaternion has another length.
+        A ParameterError if its length is not so to 1e-3. ``q`` itself stays as it is.
         """
         x, y, z, w = q[3:7].tolist()
         square = x * x + y * y + z * z + w * w
@@ -309,7 +303,7 @@ class FloatingBaseBiped(Biped):
         Args:
             q, other: (nq,) configurations, not half a turn apart.
         """
-        return np.asarray(pin.difference(self.model, q, other))
+        return pin.difference(self.model, q, other)
 
     def hip_height(self, q: Array) -> float:
         """Mean height of the hips that swing the legs forward [m], at the last update."""

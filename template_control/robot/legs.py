@@ -62,14 +62,14 @@ def straight_legs(
     finds them, ends at its ankle, and stands on its sole, which is level where all joints are at 0.
     """
     data, q, legs = model.createData(), pin.neutral(model), leg_joints(model, feet, base_joints)
-    placing = {joint for leg in legs for joint in leg}
-    for joint in range(2, model.njoints) if flat else ():
-        if joint not in placing:
+    if flat:
+        for joint in set(range(2, model.njoints)).difference(*legs):
             place = model.idx_qs[joint]
             stops = model.lowerPositionLimit[place], model.upperPositionLimit[place]
             q[place] = min(max(0.0, stops[0]), stops[1])
-    for leg in () if flat else legs:
-        _turn_lateral(model, data, q, leg)
+    else:
+        for leg in legs:
+            _turn_lateral(model, data, q, leg)
     axes = np.array(pin.computeJointJacobians(model, data, q)[3:])
     pin.updateFramePlacements(model, data)
     reaches = []
