@@ -32,7 +32,7 @@ class BaseFilterOptions(Checked):
     creep: Positive = tuned(0.01, SPEED)
 
 
-class PlanarTrunk:
+class _PlanarTrunk:
     """A planar robot's trunk, with d = 2 directions and a = 1 axis about which it turns."""
 
     axes = 1
@@ -69,8 +69,8 @@ class PlanarTrunk:
         return np.eye(2)
 
 
-class FloatingTrunk:
-    """As :class:`PlanarTrunk`, in space; the base is a place and a quaternion (x, y, z, w)."""
+class _FloatingTrunk:
+    """As :class:`_PlanarTrunk`, in space; the base is a place and a quaternion (x, y, z, w)."""
 
     axes = 3
 
@@ -80,20 +80,17 @@ class FloatingTrunk:
         self._rolled = np.zeros((len(robot.feet), 3))
 
     def rotation(self, base: Array) -> Array:
-        """See :class:`PlanarTrunk`."""
-        return np.asarray(pin.Quaternion(base[3:7]).toRotationMatrix())
+        return pin.Quaternion(base[3:7]).toRotationMatrix()
 
     def turned(self, base: Array, angle: Array) -> Array:
-        """See :class:`PlanarTrunk`."""
         quaternion = pin.Quaternion(base[3:7]) * pin.Quaternion(pin.exp3(angle))
         return np.concatenate((base[:3], quaternion.normalized().coeffs()))
 
     def swept(self, rotation: Array, vector: Array) -> Array:
-        """See :class:`PlanarTrunk`."""
-        return np.asarray(-rotation @ pin.skew(vector))
+        return -rotation @ pin.skew(vector)
 
     def rolled(self, q: Array) -> Array:
-        """See :class:`PlanarTrunk`: the turns of the feet since the last call are added."""
+        """The turns of the feet since the last call are added."""
         feet, before = self._robot.foot_rotation, self._feet
         self._feet = feet
         if before is not None and self._robot.foot_radius:
@@ -103,18 +100,16 @@ class FloatingTrunk:
         return self._rolled
 
     def middle(self, base: Array, other: Array) -> Array:
-        """See :class:`PlanarTrunk`."""
         rotation = self.rotation(base)
-        return np.asarray(rotation @ pin.exp3(0.5 * pin.log3(rotation.T @ self.rotation(other))))
+        return rotation @ pin.exp3(0.5 * pin.log3(rotation.T @ self.rotation(other)))
 
     def velocity_axes(self, base: Array) -> Array:
-        """See :class:`PlanarTrunk`: the trunk's."""
         return self.rotation(base)
 
 
-def trunk_frame(robot: PlanarBiped | FloatingBaseBiped) -> PlanarTrunk | FloatingTrunk:
+def trunk_frame(robot: PlanarBiped | FloatingBaseBiped) -> _PlanarTrunk | _FloatingTrunk:
     """The trunk's frame of a robot of either kind."""
-    return FloatingTrunk(robot) if isinstance(robot, FloatingBaseBiped) else PlanarTrunk(robot)
+    return _FloatingTrunk(robot) if isinstance(robot, FloatingBaseBiped) else _PlanarTrunk(robot)
 
 
 class BaseFilter:

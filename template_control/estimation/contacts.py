@@ -16,7 +16,6 @@ from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative
 from template_control.compiled import compiled
-from template_control.robot.biped import SINGLE
 from template_control.robot.terms import LEGS, MOST_CONTACTS
 from template_control.slip.similarity import TIME, Scale, tuned
 
@@ -112,7 +111,7 @@ def set_contacts(
     options: ContactOptions,
     weight: float,
     scale: Scale,
-    groups: Sequence[Sequence[int]] = SINGLE,
+    groups: Sequence[Sequence[int]],
 ) -> None:
     """Write the constants of a robot of a weight [N], and of its feet's contacts, into ``data``."""
     now = data[0]

@@ -141,10 +141,10 @@ class ImuSensors:
 
     def measure(self, q: Array, v: Array, contact: BoolArray) -> tuple[Array, Array]:
         """As :meth:`~template_control.run.sensing.Senses.measure`."""
-        dt = 0.0 if self._before is None else self._dt
+        dt = self._dt
         if self._before is None:
             self._estimator.reset(q, v)
-            self._before = q, v
+            self._before, dt = (q, v), 0.0
         found = self._estimator.update(self._read(q, v, contact), self._expected, dt)
         self._before = q.copy(), v.copy()
         return found

@@ -12,6 +12,7 @@ import template_control as tc
 from template_control.embedding import EmbeddingOptions
 from template_control.estimation import ContactOptions
 from template_control.estimation.contacts import CONTACTS, set_contacts
+from template_control.robot.biped import SINGLE
 from template_control.robot.library import load_floating_robot
 from template_control.robot.start import state_at_vlo
 from template_control.slip.similarity import Scale
@@ -24,7 +25,7 @@ STANDS, IN_THE_AIR, DUE = True, False, None
 
 def contacts_of(standing=(False, False), options=OPTIONS):
     found = np.zeros(1, CONTACTS)
-    set_contacts(found, options, WEIGHT, Scale.of(tc.SlipParameters()))
+    set_contacts(found, options, WEIGHT, Scale.of(tc.SlipParameters()), SINGLE)
     for _ in range(DOUBT):
         take_in(found, np.array(standing), None, standing, DT)
     return found
