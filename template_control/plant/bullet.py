@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, partial
 from inspect import isbuiltin
@@ -24,7 +24,7 @@ from template_control.plant.c_library import decimal_points, silenced
 from template_control.plant.terrain import Terrain, pieces
 from template_control.plant.world import EnginePlant, WorldOptions
 from template_control.robot.biped import Biped
-from template_control.robot.terms import FLOATING_DOF, PATCH, PLANAR_DOF
+from template_control.robot.terms import FLOATING_DOF, PLANAR_DOF
 from template_control.robot.urdf import mass_of, named
 from template_control.warm_up import Part, ready
 
@@ -34,14 +34,6 @@ _POSITION = FLOATING_DOF + 1  # numbers of a floating base's place
 _ANGULAR_FIRST = (3, 4, 5, 0, 1, 2)  # places of a velocity's components, linear first
 _Three = tuple[float, float, float]
 _Four = tuple[float, float, float, float]
-AXES = {2: [0, 2], 3: [0, 1, 2]}
-"""Of a force's components, by how many there are."""
-
-
-def moment(place: Sequence[float], force: Sequence[float]) -> tuple[float, float, float]:
-    """Moment of a force about the origin [N m]; NumPy's cross product takes 40 us."""
-    (x, y, z), (fx, fy, fz) = place, force
-    return y * fz - z * fy, z * fx - x * fz, x * fy - y * fx
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +110,8 @@ class BulletPlant(EnginePlant):
         try:
             self.body = _load_body(robot, self._world, held=not self._floats)
             # The base link's axes of inertia in its own frame.
-            self._inertial = _pose(*self._world.getDynamicsInfo(self.body, _BASE)[3:5])
+            base = self._world.getDynamicsInfo(self.body, _BASE)
+            self._inertial = pin.XYZQUATToSE3([*base[3], *base[4]])
             count = self._world.getNumJoints(self.body)
             info = [self._world.getJointInfo(self.body, i) for i in range(count)]
             by_name = {row[1].decode(): row[0] for row in info}
@@ -209,12 +202,10 @@ class BulletPlant(EnginePlant):
             self._reset_trunk(q, v)
 
     def _reset_trunk(self, q: Array, v: Array) -> None:
-        trunk = _pose(q[:3], q[3:_POSITION])
+        trunk = pin.XYZQUATToSE3(q[:_POSITION])
         place = trunk * self._inertial
-        quaternion = pin.Quaternion(place.rotation).coeffs().tolist()
-        self._world.resetBasePositionAndOrientation(
-            self.body, place.translation.tolist(), quaternion
-        )
+        *centre, x, y, z, w = pin.SE3ToXYZQUAT(place).tolist()
+        self._world.resetBasePositionAndOrientation(self.body, centre, (x, y, z, w))
         linear, angular = trunk.rotation @ v[:3], trunk.rotation @ v[3:FLOATING_DOF]
         linear = linear + np.cross(angular, place.translation - trunk.translation)
         self._world.resetBaseVelocity(self.body, linear.tolist(), angular.tolist())
@@ -238,8 +229,7 @@ class BulletPlant(EnginePlant):
         Asked for one body, PyBullet turns the normal towards it but not the friction, so ask for
         all. Whatever touches the robot is ground: it does not collide with itself.
         """
-        forces, feet, body = self._forces, self._feet, self.body
-        axes, rows = AXES[self.robot.directions], forces.shape[1]
+        feet, body = self._feet, self.body
         for contact in self._world.getContactPoints():
             sign, link = (1.0, contact[3]) if contact[1] == body else (-1.0, contact[4])
             foot = feet.get(link)
@@ -249,11 +239,8 @@ class BulletPlant(EnginePlant):
             # Forces along the normal (a wall's is level) and two directions of friction.
             normal, one, other = sign * contact[9], sign * contact[10], sign * contact[12]
             out, slip, across = contact[7], contact[11], contact[13]
-            force = [normal * out[i] + one * slip[i] + other * across[i] for i in axes]
-            if rows == PATCH:
-                force += moment(contact[6], force)
-            for i, part in enumerate(force):
-                forces[foot, i] += part
+            force = [normal * out[i] + one * slip[i] + other * across[i] for i in range(3)]
+            self._press(foot, contact[6], force)
 
     def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""
@@ -302,11 +289,6 @@ def _ground_bodies(terrain: Terrain, world: Any) -> dict[int, float | None]:
         body = world.createMultiBody(0, box, basePosition=piece.centre, baseOrientation=turn)
         found[body] = piece.friction
     return found
-
-
-def _pose(position: Any, quaternion: Any) -> pin.SE3:
-    """A frame from its place [m] and its quaternion x y z w."""
-    return pin.SE3(pin.Quaternion(np.array(quaternion)).matrix(), np.array(position))
 
 
 @compiled

@@ -13,12 +13,12 @@ from template_control.checks.checked import checked
 from template_control.checks.ranges import Positive
 from template_control.errors import ParameterError, RobotError
 from template_control.plant.agreement import check_mass_matrix
-from template_control.plant.bullet import AXES, PlantOptions, moment
+from template_control.plant.bullet import PlantOptions
 from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.plant.world import EnginePlant
 from template_control.robot.biped import Biped
-from template_control.robot.terms import PATCH, UP
+from template_control.robot.terms import UP
 
 # Where MuJoCo has the place of a floating base, whose quaternion begins with w, and its velocity.
 _PLACE, _SPEED = [0, 1, 2, 4, 5, 6, 3], [0, 1, 2, 3, 4, 5]
@@ -96,14 +96,13 @@ class MujocoPlant(EnginePlant):
         self._trunk = self.model.body(TRUNK).id
         shapes = [self.model.geom(i).name for i in range(self.model.ngeom)]
         self._feet = {
-            shape: i
-            for i in range(len(robot.feet))
+            shape: int(name.removeprefix(FOOT).partition("_")[0])
             for shape, name in enumerate(shapes)
-            if name.partition("_")[0] == f"{FOOT}{i}"
+            if name.startswith(FOOT)
         }
         _, stand_out = pieces(options.ground)  # the first shapes, after the plane
-        own = [False, *(piece.friction is not None for piece in stand_out)]
-        self._common_ground = [i for i, has_own in enumerate(own) if not has_own]
+        common = [True, *(piece.friction is None for piece in stand_out)]
+        self._common_ground = np.flatnonzero(common)
         self._trunk_shapes = {i for i, name in enumerate(shapes) if name.startswith(TRUNK)}
         self._force = np.zeros(6)
         check_mass_matrix(robot, "MuJoCo", self._mass_matrix)
@@ -137,8 +136,7 @@ class MujocoPlant(EnginePlant):
 
     def _find_contacts(self) -> None:
         """See :class:`~.world.EnginePlant`."""
-        rows = self._forces.shape[1]
-        axes, contacts = AXES[min(rows, UP + 1)], self.data.contact
+        contacts = self.data.contact
         for i, shapes in enumerate(contacts.geom.tolist()):
             ours = 1 if shapes[1] in self._feet else 0
             foot = self._feet.get(shapes[ours])
@@ -147,12 +145,9 @@ class MujocoPlant(EnginePlant):
                 continue
             self._engine.mj_contactForce(self.model, self.data, i, self._force)
             # The contact's axes are the rows of its frame; its force acts on the second shape.
-            force = (contacts.frame[i].reshape(3, 3).T @ self._force[:3])[axes]
+            force = contacts.frame[i].reshape(3, 3).T @ self._force[:3]
             force = force if ours else -force
-            if rows == PATCH:
-                turning = moment(contacts.pos[i].tolist(), force.tolist())
-                force = np.concatenate((force, turning))
-            self._forces[foot] += force
+            self._press(foot, contacts.pos[i].tolist(), force.tolist())
 
     def step(self, torque: Array, push: float = 0.0, left: float = 0.0) -> None:
         """See :meth:`~.plant.Plant.step`; the disturbance is along the world's x and y [N]."""

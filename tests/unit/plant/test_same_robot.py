@@ -8,8 +8,9 @@ import pytest
 from falling import DT, FREE, PLANAR, falls_as_pinocchio_says
 
 from template_control.errors import RobotError
-from template_control.plant.bullet import BulletPlant, PlantOptions, moment
+from template_control.plant.bullet import BulletPlant, PlantOptions
 from template_control.plant.mujoco import MujocoOptions, MujocoPlant
+from template_control.plant.world import moment
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.library import (
     FLOATING_ROBOTS,
