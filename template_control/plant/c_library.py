@@ -9,18 +9,16 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 
 _STDOUT, _STDERR = 1, 2
 # POSIX has a mask for each category; glibc, musl and macOS number its bits as the categories.
 _NUMERIC = 1 << locale.LC_NUMERIC
 
 
-@contextmanager
-def stdout_to_stderr() -> Iterator[None]:
+def stdout_to_stderr() -> AbstractContextManager[None]:
     """Send everything that is written to standard output, also by C code, to stderr."""
-    with _redirected((_STDOUT,), _STDERR):
-        yield
+    return _redirected((_STDOUT,), _STDERR)
 
 
 @contextmanager
