@@ -24,11 +24,7 @@ from template_control.slip.gaits.gait import (
     gait_stride,
     with_push_off,
 )
-from template_control.slip.gaits.running_gait import (
-    RunningGait,
-    running_gait,
-    suited_height,
-)
+from template_control.slip.gaits.running_gait import running_gait, suited_height
 from template_control.slip.gaits.walking_by_speed import (
     family_speeds,
     gait_for_speed,
@@ -91,9 +87,8 @@ def default_gait(robot: Biped, touchdown_angle: Angle | None = None) -> WalkingG
     """
     parameters = template_for(robot)
     angle, speed = robot.walk or (_SOLE_WALK if robot.patches else _WALK)
-    unit = parameters.speed_unit
     angle = angle if touchdown_angle is None else touchdown_angle
-    return with_push_off(gait_at(parameters, angle, float(speed * unit)))
+    return with_push_off(gait_at(parameters, angle, float(speed * parameters.speed_unit)))
 
 
 @checked
@@ -244,21 +239,6 @@ def _stance(robot: Biped, gait: WalkingGait) -> float:
     return torque / min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
 
 
-def knee_torque(robot: Biped, gait: RunningGait) -> float:
-    """Torque that a knee needs at the bottom of a stance, estimated [N m].
-
-    A share of the template's leg force times the distance of a knee from the line between hip and
-    foot, with a thigh as long as the shank.
-    """
-    above_hip, leg = _above_hips(robot), _shortest_leg(gait)
-    straight = 0.5 * robot.leg_length
-    half = 0.5 * max(leg - above_hip - robot.foot_radius, 0.0)
-    away = float(np.sqrt(max(straight**2 - half**2, 0.0)))
-    p = gait.parameters
-    torque = _KNEES * float(gait.controls[Slot.K_SC]) * (p.rest_length - leg) * away
-    return torque / len(robot.groups[0])  # knees that bend together
-
-
 def walk_limits(robot: Biped) -> WalkLimits:
     """Limits of the walks that are planned several steps ahead for a robot.
 
@@ -289,12 +269,6 @@ def walk_limits(robot: Biped) -> WalkLimits:
     )
 
 
-def _shortest_leg(gait: RunningGait) -> float:
-    """Length of the template's leg at the bottom [m]."""
-    result, _ = ReturnMap(gait.parameters, gait.stride).evaluate(gait.apex, gait.controls)
-    return float(result[REAR_BOTTOM])
-
-
 def can_stand(robot: Biped) -> bool:
     """True if a robot can stand: in its plane, or on feet that are no points."""
     return robot.directions <= UP or bool(robot.half_length)
@@ -321,9 +295,9 @@ def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Posit
     """
     if _bears(robot, speed, height, torque_scale):
         return
-    length = template_for(robot).rest_length
-    running_gait(template_for(robot), speed)  # the speed may be the culprit
-    good = [h for h in length * _HEIGHTS if _bears(robot, speed, float(h), torque_scale)]
+    p = template_for(robot)
+    running_gait(p, speed)  # the speed may be the culprit
+    good = [h for h in p.rest_length * _HEIGHTS if _bears(robot, speed, float(h), torque_scale)]
     what = f"{robot.name} cannot run at {speed:g} m/s with its apex at {height:g} m"
     if not good:
         raise GaitError(f"{what}, nor at any other height: its motors are too weak; run slower")
@@ -331,12 +305,23 @@ def check_apex(robot: Biped, speed: float, height: Positive, torque_scale: Posit
 
 
 def _bears(robot: Biped, speed: float, height: float, torque_scale: float) -> bool:
-    """True if there is such a gait, and its stance does not ask too much of a knee."""
+    """True if there is such a gait, and its stance does not ask too much of a knee.
+
+    At the bottom that is a share of the template's leg force times the distance of a knee from the
+    line between hip and foot, with a thigh as long as the shank.
+    """
     p = template_for(robot)
     try:
         gait = running_gait(p, speed, height)
     except GaitError:
         return False
+    result, _ = ReturnMap(gait.parameters, gait.stride).evaluate(gait.apex, gait.controls)
+    leg = float(result[REAR_BOTTOM])
+    if leg < _SHORTEST * p.rest_length:
+        return False
+    straight = 0.5 * robot.leg_length
+    half = 0.5 * max(leg - _above_hips(robot) - robot.foot_radius, 0.0)
+    away = float(np.sqrt(max(straight**2 - half**2, 0.0)))
+    torque = _KNEES * float(gait.controls[Slot.K_SC]) * (p.rest_length - leg) * away
     limit = torque_scale * min(float(robot.torque_limit[leg[1]]) for leg in robot.hinges)
-    folded = _shortest_leg(gait) < _SHORTEST * p.rest_length
-    return not folded and knee_torque(robot, gait) <= _BEARABLE * limit
+    return torque / len(robot.groups[0]) <= _BEARABLE * limit  # knees that bend together
