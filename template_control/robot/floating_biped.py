@@ -212,12 +212,11 @@ class FloatingBaseBiped(Biped):
         if upper_body and not flat:
             raise RobotError(f"{path}: upper_body is of a robot on flat feet: give flat_feet too")
         if locked or flat:
-            others = urdf_edits.joints_in_no_leg(tree, feet) if flat else set()
-            held = {
-                *(locked or {}),
-                *(urdf_edits.mimics(tree).keys() & others if upper_body else others),
-            }
-            urdf_edits.lock(path, tree, urdf_edits.moving_joints(tree, held), locked or {})
+            held = urdf_edits.joints_in_no_leg(tree, feet) if flat else set()
+            if upper_body:
+                held = urdf_edits.mimics(tree).keys() & held
+            moving = urdf_edits.moving_joints(tree, held | (locked or {}).keys())
+            urdf_edits.lock(path, tree, moving, locked or {})
             urdf_edits.take_points(path, tree)
         urdf_edits.spheres(path, tree, feet, foot_radius, foot_offset)
         urdf = urdf_edits.complete(path, tree)

@@ -7,9 +7,9 @@ the angles.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from math import atan2, cos, hypot, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -24,8 +24,7 @@ _ITERATIONS = 30
 _QUARTERS = (0.0, 0.5 * pi, pi, -0.5 * pi)  # where the search for a lateral hip begins [rad]
 
 
-@dataclass(frozen=True)
-class StraightLegs:
+class StraightLegs(NamedTuple):
     """Legs that hang straight down from an upright trunk."""
 
     q: Array  # (nq,) configuration, with each hinge's angle next to the middle of its range

@@ -52,11 +52,11 @@ def check_planar(path: Path, model: pin.Model, legs: int) -> None:
     joints = [
         (name, joint.shortname()) for name, joint in zip(model.names, model.joints, strict=True)
     ]
-    hinged = [joint.nq == joint.nv == 1 for joint in model.joints[1 : PLANAR_DOF + 1]]
+    hinged = all(joint.nq == joint.nv == 1 for joint in model.joints[1 : PLANAR_DOF + 1])
     columns = pin.computeJointJacobians(model, model.createData(), pin.neutral(model))
     base = np.eye(6)[[0, 2, 4]].T  # in the world's axes, the pitch joint at its origin
     given = columns[:, :PLANAR_DOF]
-    if not all(hinged) or given.shape != base.shape or not _near(given[3:], base[3:]):
+    if not hinged or given.shape != base.shape or not _near(given[3:], base[3:]):
         raise RobotError(
             f"{path} is not planar: its first joints are {joints[1 : PLANAR_DOF + 1]},"
             " and must be prismatic x, prismatic z, revolute y; of a 3D robot, name the hips and"
@@ -218,9 +218,8 @@ def _check_limits(path: Path, model: pin.Model, first: int) -> None:
     joints = range(first, model.njoints)
     for joint in joints:
         place = model.idx_qs[joint]
-        stops = float(model.lowerPositionLimit[place]), float(model.upperPositionLimit[place])
-        if _TURNS < max(map(abs, stops)) <= _DEGREES:
-            low, high = stops
+        low, high = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+        if _TURNS < max(abs(low), abs(high)) <= _DEGREES:
             raise RobotError(
                 f"{path}: joint {model.names[joint]!r} goes from {low:g} to {high:g} rad, which"
                 " look like degrees: give its limits in radians, or make it continuous"

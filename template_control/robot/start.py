@@ -16,6 +16,7 @@ from template_control.errors import ParameterError, RobotError
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.legs import foot_frame
 from template_control.robot.planar_biped import PlanarBiped
+from template_control.robot.robot import WORLD_ALIGNED
 from template_control.robot.terms import PLANAR_DOF
 
 _SHORT = 0.15  # of a step of Newton's method [rad]
@@ -252,6 +253,7 @@ def _floating_configuration(
     upright = pin.rpy.rpyToMatrix(0.0, pose.pitch, 0.0)
     feet = _by_contact(robot, pose, pose.feet)
     feet[:, :2] += robot.spread
+    data = robot.model.createData()
 
     def missed(q: Array) -> tuple[Array, Array]:
         turn = pin.log3(robot.rotation @ upright.T)
@@ -261,10 +263,11 @@ def _floating_configuration(
             away = np.hstack((away, [pin.log3(turned) for turned in axes]))
         rows, r = robot.placing_rows(), robot.foot_radius
         # The lowest point's path, not that of the material point which touches there.
-        for foot in range(len(robot.feet) if r > 0.0 else 0):
-            turning = _foot_turning(robot, q, foot)
-            rows[6 + 3 * foot] += r * turning[1]
-            rows[7 + 3 * foot] -= r * turning[0]
+        for i, foot in enumerate(robot.feet if r > 0.0 else ()):
+            frame = foot_frame(robot.model, foot)
+            turning = pin.computeFrameJacobian(robot.model, data, q, frame, WORLD_ALIGNED)[3:]
+            rows[6 + 3 * i] += r * turning[1]
+            rows[7 + 3 * i] -= r * turning[0]
         return np.concatenate((robot.space.com - pose.com, turn, away.ravel())), rows
 
     return _newton(robot, q, missed, FloatingBaseBiped.smallest_motion, longest, 100)
@@ -276,14 +279,6 @@ def _by_contact(robot: FloatingBaseBiped, pose: Pose, values: Array) -> Array:
     for leg, value in zip((pose.rear, 1 - pose.rear), values, strict=True):
         found[list(robot.groups[leg])] = value
     return found
-
-
-def _foot_turning(robot: FloatingBaseBiped, q: Array, foot: int) -> Array:
-    """(3, nv) Jacobian of the angular velocity of a contact's sphere, in the world's axes."""
-    data = robot.model.createData()
-    frame = foot_frame(robot.model, robot.feet[foot])
-    world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
-    return pin.computeFrameJacobian(robot.model, data, q, frame, world)[3:]
 
 
 def _solved(robot: PlanarBiped, matrix: Array, right: Array) -> Array:

@@ -325,8 +325,7 @@ def _add_inertia(link: ET.Element, inertia: pin.Inertia) -> None:
 def root_link(robot: ET.Element) -> str:
     """The link that is no joint's child."""
     children = {child.get("link") for child in robot.findall("joint/child")}
-    names = [str(link.get("name")) for link in robot.findall("link")]
-    return next((name for name in names if name not in children), "")
+    return next((name for name in urdf.named(robot, "link") if name not in children), "")
 
 
 def origin_of(element: ET.Element) -> ET.Element:
