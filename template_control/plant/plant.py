@@ -117,24 +117,21 @@ def robot_in(world: WorldOptions, robot: R) -> R:
 
     A ParameterError if the world's robot has other joints or feet, or another base.
     """
-    own = robot
-    if world.robot is not None:
-        found = world.robot.load()
-        if not isinstance(found, type(robot)):
+    own = robot if world.robot is None else world.robot.load()
+    if not isinstance(own, type(robot)):
+        raise ParameterError(
+            f"the robot of the world, {own.name}, has another base than {robot.name}: give both a"
+            " floating one or none"
+        )
+    for name, one, other in (
+        ("joints", robot.joint_names, own.joint_names),
+        ("feet", robot.feet, own.feet),
+    ):
+        if one != other:
             raise ParameterError(
-                f"the robot of the world, {found.name}, has another base than {robot.name}: give"
-                " both a floating one or none"
+                f"the robot of the world has the {name} {', '.join(other)}: give one with"
+                f" {', '.join(one)}, as {robot.name} has them"
             )
-        for name, one, other in (
-            ("joints", robot.joint_names, found.joint_names),
-            ("feet", robot.feet, found.feet),
-        ):
-            if one != other:
-                raise ParameterError(
-                    f"the robot of the world has the {name} {', '.join(other)}: give one with"
-                    f" {', '.join(one)}, as {robot.name} has them"
-                )
-        own = found
     gravity = world.gravity or (world.robot and world.robot.gravity) or robot.gravity
     return own if gravity == own.gravity else own.changed(gravity)
 
