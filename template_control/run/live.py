@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
+from inspect import GEN_CLOSED, getgeneratorstate
 from math import copysign, degrees, hypot, inf
 from threading import Lock
 from typing import Any, NamedTuple
@@ -133,7 +134,6 @@ class LiveRun:
         hand: pushes, friction and velocity while the run goes on.
         recorder: of the run so far.
         reason: why the robot fell; "" if it did not.
-        ended: whether there is no further tick.
         endless: whether neither the experiment nor its motion has an end.
     """
 
@@ -152,7 +152,7 @@ class LiveRun:
         supervisor = self.controller.supervisor
         self.endless = o.steps is None and supervisor.route.endless
         self._last = most if self.endless else o.steps or inf
-        self.reason, self.ended = "", False
+        self.reason = ""
         with ExitStack() as stack:
             parts = (o.motion, supervisor.route, *supervisor.planners.values())
             stack.enter_context(exclusive(o.robot, *parts, *o.planners.values()))
@@ -175,11 +175,7 @@ class LiveRun:
         return self
 
     def __next__(self) -> Tick:
-        try:
-            return next(self._ticks)
-        except BaseException:
-            self.ended = True
-            raise
+        return next(self._ticks)
 
     def __enter__(self) -> LiveRun:
         return self
@@ -190,18 +186,19 @@ class LiveRun:
     def finish(self, progress: Callable[[int], None] | None = None) -> None:
         """Go on to the end; ``progress`` gets the number of completed steps after each."""
         done = 0
-        try:
-            for tick in self._ticks:
-                if tick.steps > done:
-                    done = tick.steps
-                    if progress is not None:
-                        progress(done)
-        finally:
-            self.ended = True
+        for tick in self._ticks:
+            if tick.steps > done:
+                done = tick.steps
+                if progress is not None:
+                    progress(done)
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is no further tick."""
+        return getgeneratorstate(self._ticks) == GEN_CLOSED
 
     def close(self) -> None:
         """End the run, and give back its plant, robot and planners; the record stays."""
-        self.ended = True
         self._ticks.close()
         self._held.close()
 
