@@ -14,7 +14,6 @@ from template_control.cli.plots import add_figure_options
 from template_control.cli.report import NO_STANDS, add_template, run_and_keep, tables
 from template_control.errors import ParameterError
 from template_control.run.experiment import Experiment
-from template_control.run.live import COMPILED
 from template_control.run.specs import GaitSpec
 from template_control.run.summary import summarise
 from template_control.slip.gaits.gait import Gait
@@ -23,7 +22,6 @@ from template_control.slip.scenario.run import ScenarioRecord, simulate_scenario
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.storage import Files
 from template_control.terminal import plain_console, report
-from template_control.warm_up import ready
 
 _KEPT = (
     " Ends with a table, and a folder with the run (run.npz), what repeats it (run.toml) and"
@@ -70,7 +68,6 @@ class Motion:
     def run(self, options: argparse.Namespace) -> int:
         """Do the run; returns 0, 1 after a fall, 130 after Ctrl-C."""
         experiment = experiment_from(options, self.default)
-        ready(COMPILED)
         prepared = experiment.prepare()
         template = _template_of(prepared.motion) if self.template else None
         files = Files()

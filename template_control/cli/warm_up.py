@@ -12,8 +12,7 @@ from template_control.plant.ideal import IdealOptions
 from template_control.robot.library import load_robot
 from template_control.robot.spec import RobotSpec
 from template_control.robot.template import paper_gait, template_for
-from template_control.run.experiment import Experiment
-from template_control.run.live import COMPILED
+from template_control.run.experiment import COMPILED, Experiment
 from template_control.run.simulation import simulate
 from template_control.slip.automaton.vocabulary import MapKind
 from template_control.slip.control.controllers import ModifiedWalking

@@ -23,10 +23,7 @@ from template_control.embedding.options import (
     kind_of,
     robot_kind,
 )
-from template_control.embedding.planners.ahead import (
-    AheadOptions,
-    AheadPlanner,
-)
+from template_control.embedding.planners.ahead import AheadOptions, AheadPlanner
 from template_control.embedding.planners.default import default_planners, first_speed
 from template_control.embedding.planners.lqr import WALK, LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
@@ -34,6 +31,7 @@ from template_control.embedding.planners.planner import Planner, Planners
 from template_control.embedding.planners.running import RunningOptions, RunningPlanner
 from template_control.embedding.tick import CONTROL
 from template_control.errors import ParameterError
+from template_control.estimation.delay import DELAY
 from template_control.estimation.imu import ImuOptions
 from template_control.plant.bullet import PlantOptions
 from template_control.plant.ideal import IdealOptions
@@ -43,11 +41,9 @@ from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.spec import RobotSpec
 from template_control.robot.start import Pose
-from template_control.robot.template import (
-    check_apex,
-    walk_limits,
-)
+from template_control.robot.template import check_apex, walk_limits
 from template_control.run.options import FallOptions, HeadingCommand, Push, check_pushes
+from template_control.run.recorder import RECORD
 from template_control.run.robot_route import check_feasibility, robot_route, standing_options
 from template_control.run.sensing import SensorOptions
 from template_control.run.specs import GaitSpec, OwnPlanner, PlannerSpec
@@ -63,11 +59,15 @@ from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.gait import Gait, WalkingGait
 from template_control.slip.gaits.running_gait import RunningGait
 from template_control.slip.gaits.walking_by_speed import walking_gait
+from template_control.slip.planning.pressure import PRESSURE
 from template_control.slip.scenario.route import Route
 from template_control.slip.scenario.scenario import STAND_HEIGHT, Scenario, Segment
 from template_control.slip.scenario.scenario_route import ScenarioRoute
 from template_control.slip.scenario.speed_route import SpeedRoute
 from template_control.warm_up import ready
+
+COMPILED = (*WALK, *CONTROL, *RECORD, *DELAY, *PRESSURE)
+"""Compiled functions of a walk and its record; of two processes one compiles the first."""
 
 STEPS = 50  # steps of a run on a route that does not end, where the experiment does not say
 
@@ -255,7 +255,7 @@ class Experiment(Checked):
         if not e.free:
             _check_plane(robot, e)
         # Before the gait is looked for, which would compile a part of it alone.
-        ready((*CONTROL, *WALK))
+        ready(COMPILED)
         motion, steps, velocity = e.motion, e.steps, None
         if isinstance(motion, VelocityProfile | VelocityCommand):
             velocity, motion = velocity_route(robot, motion, e.course)

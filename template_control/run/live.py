@@ -7,7 +7,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
+from dataclasses import fields, replace
 from inspect import GEN_CLOSED, getgeneratorstate
 from math import copysign, degrees, hypot, inf
 from threading import Lock
@@ -21,31 +21,26 @@ from template_control.checks.ranges import Positive
 from template_control.embedding.controller import EmbeddingController
 from template_control.embedding.planners.default import default_planners
 from template_control.embedding.state import SectionReport
-from template_control.embedding.tick import CONTROL
 from template_control.errors import DivergedError, ParameterError
-from template_control.estimation.delay import DELAY
 from template_control.plant.plant import Plant, open_plant, plant_name
+from template_control.plant.world import WorldOptions
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.template import template_for
 from template_control.run.experiment import Experiment, PreparedExperiment
 from template_control.run.hand import Hand, plant_force
-from template_control.run.metadata import conditions
+from template_control.run.metadata import plain
 from template_control.run.record import Record
-from template_control.run.recorder import RECORD, Recorder
+from template_control.run.recorder import Recorder
 from template_control.run.sensing import ContactSensors, Senses, senses_of
 from template_control.run.start import start
 from template_control.run.velocity import VelocityCommand, VelocityProfile
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event
-from template_control.slip.control.stride_kernels import STRIDES
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
-from template_control.slip.planning.pressure import PRESSURE
-from template_control.slip.planning.step_search import SEARCH
 from template_control.slip.scenario.route import Route, SteadyRoute
-from template_control.warm_up import ready
 from template_control.whole_body.solver import Solution
 
 _LOCK = Lock()
@@ -74,9 +69,6 @@ def exclusive(*parts: Any) -> Iterator[None]:
 _LOG = logging.getLogger(__name__)
 QP_FAILURES = logging.getLogger(f"{__name__}.failures")
 """Logger of the warning that the QP has no solution in many ticks."""
-
-COMPILED = (*STRIDES, *SEARCH, *CONTROL, *RECORD, *DELAY, *PRESSURE)
-"""Compiled functions of a walk and its record; of two processes one compiles the first two."""
 
 _OTHER_TEMPLATE = 0.05
 """Share by which a template may differ from the robot's own: a choice of l0, not another robot."""
@@ -141,7 +133,6 @@ class LiveRun:
     def __init__(
         self, experiment: Experiment, most: float = inf, keep: Positive | None = None
     ) -> None:
-        ready(COMPILED)
         self._given = experiment
         self._o = o = experiment.prepare()
         if not isinstance(o.robot, PlanarBiped | FloatingBaseBiped):
@@ -162,7 +153,7 @@ class LiveRun:
             _LOG.info("%s in %s: %r", o.robot.name, plant_name(o.world), self.controller.planner)
             dt = o.world.time_step
             kept = None if keep is None else max(round(keep / dt), 1)
-            self.recorder = Recorder(self.controller, o.record_every, conditions(o), keep=kept)
+            self.recorder = Recorder(self.controller, o.record_every, _conditions(o), keep=kept)
             self.plant = stack.enter_context(open_plant(o.robot, o.world))
             self.plant.reset(q, v)
             self.hand = Hand(o, self.plant)
@@ -297,6 +288,19 @@ class LiveRun:
                 self.reason = f"the simulation diverged at {now:.3f} s: {error}"
                 return
             tick += 1
+
+
+_APART = ("robot", "motion", "planner", "automaton")
+_NAMES = {"world": "plant", "controller": "embedding"}  # in records of all versions
+
+
+def _conditions(o: Experiment) -> dict[str, Any]:
+    """Conditions of a simulation; a plant of one's own is not data."""
+    given = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in _APART}
+    options = {_NAMES.get(name, name): value for name, value in given.items()}
+    if not isinstance(o.world, WorldOptions):
+        options["plant"] = {}
+    return {"plant": plant_name(o.world), "options": plain(options)}
 
 
 def _check_template(robot: Biped, given: SlipParameters) -> None:

@@ -8,9 +8,6 @@ from typing import Any
 
 from template_control.checks.fitting import shown
 from template_control.embedding.controller import EmbeddingController
-from template_control.plant.plant import plant_name
-from template_control.plant.world import WorldOptions
-from template_control.run.experiment import Experiment
 from template_control.run.statistics import Statistics
 from template_control.slip.gaits.gait import flight_share
 from template_control.storage import to_jsonable
@@ -40,26 +37,13 @@ def about(controller: EmbeddingController) -> dict[str, Any]:
         "plant": "",
         "options": {"plant": {}, "embedding": controller.options},
     }
-    return to_jsonable(found, _described)
-
-
-def conditions(o: Experiment) -> dict[str, Any]:
-    """Conditions of a simulation; a plant of one's own is not data."""
-    given = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in _APART}
-    options = {_NAMES.get(name, name): value for name, value in given.items()}
-    if not isinstance(o.world, WorldOptions):
-        options["plant"] = {}
-    return {"plant": plant_name(o.world), "options": to_jsonable(options, _described)}
+    return plain(found)
 
 
 def outcome(controller: EmbeddingController, figures: Statistics) -> dict[str, Any]:
     """Facts of a run so far; ``figures`` are over its ticks."""
     arrived = controller.supervisor.arrived
-    return to_jsonable({**_gait(controller), "arrived": arrived, "summary": figures}, _described)
-
-
-_APART = ("robot", "motion", "planner", "automaton")
-_NAMES = {"world": "plant", "controller": "embedding"}  # in records of all versions
+    return plain({**_gait(controller), "arrived": arrived, "summary": figures})
 
 
 def _gait(controller: EmbeddingController) -> dict[str, Any]:
@@ -75,6 +59,11 @@ def _gait(controller: EmbeddingController) -> dict[str, Any]:
         "gait_mean_speed": gait.step_length / gait.step_duration,
         "planner": type(planner).__name__,
     }
+
+
+def plain(value: Any) -> Any:
+    """A value as JSON keeps it, with :func:`_described` of what it does not have."""
+    return to_jsonable(value, _described)
 
 
 def _described(value: Any) -> Any:

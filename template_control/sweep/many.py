@@ -13,8 +13,7 @@ from template_control import settings
 from template_control.checks.checked import checked
 from template_control.robot.biped import Biped
 from template_control.robot.spec import RobotSpec
-from template_control.run.experiment import Experiment
-from template_control.run.live import COMPILED
+from template_control.run.experiment import COMPILED, Experiment
 from template_control.run.record import Record
 from template_control.run.simulation import simulate
 from template_control.sweep.executor import workers
