@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import atan2, hypot, nan, pi
 from typing import ClassVar
@@ -13,6 +13,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.fitting import check
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.embedding.free.motion import Course
+from template_control.embedding.options import RobotKind, robot_kind
 from template_control.errors import GaitError, ParameterError
 from template_control.robot.biped import Biped
 from template_control.robot.floating_biped import FloatingBaseBiped
@@ -35,20 +36,22 @@ _FASTEST_WALK = 0.38
 """Mean speed over sqrt(g l0) above which a floating base that can run no longer walks: it has the
 room to turn and to step to the left there."""
 
-_SLOWEST_ON_POINTS = 0.27
-"""Mean speed over sqrt(g l0) of the slowest walk of a floating base on two points. A slower step
-lasts longer than 2 sqrt(l0 / g), and what is off to the side grows by nearly tenfold in it. Bolt
-fell on its way down to 0.24 in 3 of 12 trials, at 0.2 as it turned, and at 0.16 straight on."""
-
-_SLOWEST_ON_SOLES = 0.15
-"""The same of a robot on flat feet, where the family's slow gaits begin, with other legs and steps
-a quarter shorter. On its way down to them G1 fell, as it turned or went sideways."""
-
-_SLOWEST_ON_PAIRS = 0.19  # the same of a quadruped. With slower walks Go2 fell as it turned
+_SLOWEST: Mapping[RobotKind, float] = {
+    "planar": 0.0,
+    # A slower step lasts longer than 2 sqrt(l0 / g), and what is off to the side grows by nearly
+    # tenfold in it. Bolt fell on its way down to 0.24 in 3 of 12 trials, at 0.2 as it turned, and
+    # at 0.16 straight on.
+    "free": 0.27,
+    # Here the family's slow gaits begin, with other legs and steps a quarter shorter. On its way
+    # down to them G1 fell, as it turned or went sideways.
+    "soles": 0.15,
+    "trot": 0.19,  # with slower walks Go2 fell as it turned
+}
+"""Mean speed over sqrt(g l0) of the slowest walk that a kind of robot is commanded."""
 
 _FASTEST_ON_SOLES = 0.31
-"""The same of a robot on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80 steps of
-0.9 m/s, in whose swings its hips are at the end of their range."""
+"""The same of the fastest walk on flat feet: G1 keeps 0.79 m/s for a minute, and falls after 80
+steps of 0.9 m/s, in whose swings its hips are at the end of their range."""
 
 _TAKE_OFF_ON_SOLES = 0.27  # dx/dt over sqrt(g l0) at the VLO where their runs begin: G1 ran with it
 
@@ -184,22 +187,22 @@ class VelocityRange:
     def of(cls, robot: Biped) -> VelocityRange:
         """The velocities of a ``robot``, to a centimetre per second; its update is overwritten."""
         p = template_for(robot)
+        unit = p.speed_unit
         try:
             low, high = walking_speeds(robot)
         except GaitError:
             low, high = family_speeds(p)
-        low = max(low, _slowest(robot) * p.speed_unit)
+        low = max(low, _SLOWEST[robot_kind(robot)] * unit)
         if robot.patches:
-            high = min(high, _FASTEST_ON_SOLES * p.speed_unit)
+            high = min(high, _FASTEST_ON_SOLES * unit)
         speeds = float(np.ceil(100.0 * low)) / 100.0, float(np.floor(100.0 * high)) / 100.0
         first = min(max(round(default_gait(robot).mean_speed, 2), speeds[0]), speeds[1])
-        unit = p.speed_unit
         run = round(_FASTEST_RUN * unit, 2) if can_run(robot) else 0.0
         stands = can_stand(robot)
         backward = round(_BACKWARD * unit, 2) if stands or run else 0.0
-        if not isinstance(robot, FloatingBaseBiped):
-            return cls(speeds, first, run=run, backward=backward)
         left, turning = round(_LEFT * unit, 2), round(_TURNING * p.gravity / unit, 2)
+        if not isinstance(robot, FloatingBaseBiped):
+            left = turning = 0.0
         return cls(speeds, first, left, turning, stands, run, backward)
 
     @property
@@ -227,15 +230,6 @@ def course_at(velocity: VelocityProfile | VelocityCommand, time: float, robot: B
 def _places(robot: Biped) -> bool:
     """Whether a robot goes to the left by where it places its feet, and along its course else."""
     return isinstance(robot, FloatingBaseBiped) and not robot.paired
-
-
-def _slowest(robot: Biped) -> float:
-    """Mean speed over sqrt(g l0) of the slowest walk that a robot is commanded, 0 where any is."""
-    if not isinstance(robot, FloatingBaseBiped):
-        return 0.0
-    if robot.paired:
-        return _SLOWEST_ON_PAIRS
-    return _SLOWEST_ON_SOLES if robot.patches else _SLOWEST_ON_POINTS
 
 
 def _hops(robot: Biped, gaits: Sequence[Gait]) -> bool:
@@ -279,7 +273,7 @@ def velocity_route(
     velocity = motion if foreseen else VelocityCommand(*motion.at(0.0))
     planar = not isinstance(robot, FloatingBaseBiped)
     template, changes = template_for(robot), motion.changes
-    slowest = _slowest(robot) * template.speed_unit
+    slowest = _SLOWEST[robot_kind(robot)] * template.speed_unit
 
     def forward(time: float) -> float:
         speed, *others = velocity.at(time)
