@@ -36,20 +36,16 @@ def _code(package: Path) -> str:
         digest.update(str(place).encode())
         content = path.read_bytes()
         if path.suffix == ".py":
-            digest.update(ast.dump(_without_texts(content)).encode())
+            tree = _WithoutTexts().visit(ast.parse(content))
+            digest.update(ast.dump(tree).encode())
         else:
             digest.update(content)
     return digest.hexdigest()
 
 
-def _without_texts(source: bytes) -> ast.Module:
-    """A module's tree without statements that are texts, such as docstrings."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        if isinstance(body := getattr(node, "body", None), list):
-            body[:] = [s for s in body if not (isinstance(s, ast.Expr) and _is_text(s.value))]
-    return tree
+class _WithoutTexts(ast.NodeTransformer):
+    """Takes statements that are texts, such as docstrings, out of a tree."""
 
-
-def _is_text(value: ast.expr) -> bool:
-    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+    def visit_Expr(self, node: ast.Expr) -> ast.Expr | None:
+        is_text = isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        return None if is_text else node
