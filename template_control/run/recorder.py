@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
+from itertools import accumulate, pairwise
 from math import prod
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -223,14 +223,9 @@ class Recorder:
         self._floating = robot if isinstance(robot, FloatingBaseBiped) else None
         ready(RECORD)
         self._shapes = _columns(robot)
-        widths = [prod(shape) for shape in self._shapes.values()]
-        ends = np.cumsum(widths).tolist()
-        self._places = {
-            name: slice(end - width, end)
-            for name, end, width in zip(self._shapes, ends, widths, strict=True)
-        }
+        *self._ends, width = accumulate(map(prod, self._shapes.values()))
         self._keep = keep
-        self._block, self._full = np.empty((2, _BLOCK, ends[-1]))
+        self._block, self._full = np.empty((2, _BLOCK, width))
         self._rows = 0  # of the block that is full
         self._seen = np.zeros(1, SNAPSHOT)
         views = robot.joint_places, robot.heading_frame
@@ -333,10 +328,8 @@ class Recorder:
 
     def _named(self, rows: Array) -> dict[str, Array]:
         """Columns of some rows by their names, each in its shape."""
-        return {
-            name: rows[:, self._places[name]].reshape(-1, *shape)
-            for name, shape in self._shapes.items()
-        }
+        columns = zip(self._shapes.items(), np.split(rows, self._ends, axis=1), strict=True)
+        return {name: values.reshape(-1, *shape) for (name, shape), values in columns}
 
     def latest(self, count: int) -> dict[str, Array]:
         """The last ticks, sampled or not, as the record's fields name their columns.

@@ -17,8 +17,6 @@ from template_control.slip.automaton.vocabulary import Slot
 _BASE = {"x": "m", "y": "m", "pitch": "rad"}
 _FLOATING_BASE = {**dict.fromkeys("xyz", "m"), **dict.fromkeys(("qx", "qy", "qz", "qw"), "")}
 _FLOATING_RATES = {**dict.fromkeys("xyz", "m/s"), **dict.fromkeys(("wx", "wy", "wz"), "rad/s")}
-_STATE = {"dx": "m/s", "y": "m", "dy": "m/s"}
-_SWAY = {"place": "m", "rate": "m/s"}
 _WRENCH = {**dict.fromkeys(("fx", "fy", "fz"), "N"), **dict.fromkeys(("mx", "my", "mz"), "N m")}
 _CONTROLS = {slot.name.lower(): "rad" if slot is Slot.TOUCHDOWN_ANGLE else "N/m" for slot in Slot}
 _FIRST = {"T": "time", "S": "section", "ticks": "tick"}
@@ -75,9 +73,9 @@ def _labels(record: Any) -> dict[str, Mapping[str, str]]:
         "axis": dict.fromkeys("xy", ""),
         "space_axis": dict.fromkeys("xyz", ""),
         "angle": dict.fromkeys(("roll", "pitch", "yaw"), ""),
-        "sway_state": _SWAY,
+        "sway_state": {"place": "m", "rate": "m/s"},
         "wrench": _WRENCH,
-        "state": _STATE,
+        "state": {"dx": "m/s", "y": "m", "dy": "m/s"},
         "control": _CONTROLS,
     }
 
