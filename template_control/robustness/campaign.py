@@ -17,12 +17,7 @@ from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Count, Index, NotNegative
 from template_control.errors import ParameterError, SweepError
 from template_control.plant.bullet import PlantOptions
-from template_control.robustness.disturbances import (
-    PUSH_SECONDS,
-    engine,
-    impulse_unit,
-    with_step,
-)
+from template_control.robustness.disturbances import PUSH_SECONDS, engine, impulse_unit, with_step
 from template_control.robustness.fall_cause import fall_cause
 from template_control.robustness.findings import wilson_interval
 from template_control.robustness.fingerprint import fingerprint
@@ -229,9 +224,7 @@ class CampaignConfig(Checked):
             "steps": self.mix.steps,
             "world": with_step(
                 replace(
-                    world,
-                    friction=draw.friction,
-                    mass_scale=world.mass_scale * (1.0 + draw.mass),
+                    world, friction=draw.friction, mass_scale=world.mass_scale * (1.0 + draw.mass)
                 ),
                 draw.ground_step * scale.length,
                 draw.ground_step_at * gait.step_length,

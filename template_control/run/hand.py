@@ -72,10 +72,7 @@ class Hand:
     def push(self, impulse: float, duration: float = 0.1, direction: float = 0.0) -> None:
         """Push the trunk.
 
-        Args:
-            impulse: force times duration, forward positive [N s].
-            duration: how long the force acts [s].
-            direction: of a floating-base robot, from forward to the left [rad].
+        Arguments as for :class:`~.options.Push`.
 
         Raises:
             ParameterError: if a number is out of its range, or a planar robot is to be pushed

@@ -331,12 +331,5 @@ def _holds(path: str | Path, kind: type[Record]) -> bool:
 
 @checked
 def load_record(path: str | Path) -> Record:
-    """Read a run, of a planar robot or of a floating-base one.
-
-    Args:
-        path: of the file.
-
-    Raises:
-        RecordError: if the file is missing or is no recorded run, naming what is wrong in it.
-    """
+    """As :meth:`Record.load`, of a robot of any kind."""
     return Record.load(path)

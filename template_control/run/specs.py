@@ -32,11 +32,7 @@ from template_control.slip.gaits.running_gait import RunningGait, running_gait
 from template_control.slip.gaits.walking_by_speed import gait_for_speed
 from template_control.slip.similarity import REFERENCE
 
-_GAIT_NUMBERS = {
-    "walk": ("speed", "touchdown_angle"),
-    "paper": (),
-    "run": ("speed", "apex_height"),
-}
+_GAIT_NUMBERS = {"walk": ("speed", "touchdown_angle"), "paper": (), "run": ("speed", "apex_height")}
 _RUN = 3.0 / float(np.sqrt(REFERENCE.gravity * REFERENCE.rest_length))
 SOLE_RUN = 0.53
 """Run on soles, by default and the fastest by command: dx/dt at apex over sqrt(g l0). G1 keeps it;
