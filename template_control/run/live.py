@@ -332,26 +332,13 @@ def _controller(o: PreparedExperiment) -> EmbeddingController:
 
 def _log_section(report: SectionReport, number: int) -> None:
     """Log what was decided at a section, and where the template cannot do it."""
-    decision = report.decision
-    _LOG.debug(
-        "%.3f s, step %d: at %s %s, wanted %s, controls %s",
-        report.time,
-        number,
-        report.section.name,
-        report.state,
-        report.target,
-        decision.controls,
-    )
+    decision, z, section = report.decision, report.state, report.section.name
+    now, wanted, u = f"{report.time:.3f} s, step {number}", report.target, decision.controls
+    _LOG.debug("%s: at %s %s, wanted %s, controls %s", now, section, z, wanted, u)
     if not decision.feasible:
-        _LOG.warning(
-            "%.3f s, step %d: no stride of the template starts from %s at %s",
-            report.time,
-            number,
-            report.state,
-            report.section.name,
-        )
+        _LOG.warning("%s: no stride of the template starts from %s at %s", now, z, section)
     elif not decision.nominal:
-        _LOG.info("%.3f s, step %d: the planner left its own law", report.time, number)
+        _LOG.info("%s: the planner left its own law", now)
 
 
 def _fallen(
