@@ -139,8 +139,6 @@ _EDGES = (0.3, 0.4, 0.5, 0.6, 0.7)  # of the way between two footholds
 _STARTS = 5  # seeds of the starts off the gait
 PUSH_SECONDS = 0.1  # duration of a push on the reference template [s]
 
-_TIME_STEP = PlantOptions().time_step
-
 
 def impulse_unit(parameters: SlipParameters) -> float:
     """Factor of an impulse on the reference template: M sqrt(g l0) over that template's."""
@@ -231,7 +229,8 @@ DISTURBANCES: tuple[Disturbance, ...] = (
     ),
     _lasting(
         "delay", "control delay", Unit("ms", 1e3), _ladder(2e-3, 25),
-        lambda _, level, __: {"delay": level}, lambda p: Scale.of(p).time, _TIME_STEP,
+        lambda _, level, __: {"delay": level}, lambda p: Scale.of(p).time,
+        PlantOptions().time_step,
     ),
 )  # fmt: skip
 """All that are measured, in the order they are shown in."""

@@ -328,7 +328,8 @@ class Experiment(Checked):
             RecordError: if the file cannot be written.
             ParameterError: if something in it can be given in Python only.
         """
-        return storage.write_text(path, _HEAD + settings.text(settings.to_table(self.resolved())))
+        head = "# template-control walk --config FILE repeats this run; so does run, for a run.\n"
+        return storage.write_text(path, head + settings.text(settings.to_table(self.resolved())))
 
     @classmethod
     @checked
@@ -476,6 +477,3 @@ def _check_strictly(motion: Gait | Route, planner: Planner | Planners) -> None:
             "strict goes with a scenario that only walks, and with planner ahead: leave it out"
         )
     check_feasibility(motion, ahead)
-
-
-_HEAD = "# template-control walk --config FILE repeats this run; so does run, for a run.\n"

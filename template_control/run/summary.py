@@ -32,13 +32,6 @@ STANDING: dict[str, str] = {
 }
 """The kinds of stride of a scenario that stands."""
 
-OTHERS: dict[str, str] = {
-    StrideKind.WALK_PUSH_OFF: "walking with push-off",
-    StrideKind.HOP: "hopping",
-    **STANDING,
-}
-"""The kinds of stride that only some runs have."""
-
 _STATE = ("speed", "height", "vertical_speed")
 _LAST = 50  # strides that a gait is judged by
 _TAKEN = 1e-3  # [m/s]: a speed so near the wanted one is the wanted one
@@ -67,7 +60,8 @@ def _sections(record: Record) -> dict[str, Any]:
 def completed_strides(record: Record) -> dict[str, int]:
     """Number of completed strides of each kind, the kinds in words."""
     kinds = Counter(record.kinds_of_stride[:-1])
-    names = STRIDES | OTHERS
+    others = {StrideKind.WALK_PUSH_OFF: "walking with push-off", StrideKind.HOP: "hopping"}
+    names = STRIDES | STANDING | others
     return {names.get(kind, kind): count for kind, count in kinds.items()}
 
 

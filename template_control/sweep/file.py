@@ -112,12 +112,10 @@ class SweepFile:
             self._write(first)
 
     def _compare(self, line: bytes) -> None:
-        try:
+        found: Any = None
+        with suppress(ValueError):
             found = json.loads(line)
-            known = found["format"] == _FORMAT
-        except (ValueError, KeyError, TypeError):
-            known = False
-        if not known:
+        if not isinstance(found, dict) or found.get("format") != _FORMAT:
             self._refuse("holds no sweep")
         for key, value in self._head.items():
             if found.get(key) != value:
