@@ -121,10 +121,7 @@ class DisturbanceDistribution(Checked):
         return DisturbanceSample(**drawn, push_at=float(at[0]), ground_step_at=float(at[1]))
 
     def times(self, factor: NotNegative) -> DisturbanceDistribution:
-        """The same mix with all its ranges so many times as far from where nothing disturbs.
-
-        Args:
-            factor: 0 for no disturbance, 1 for this mix.
+        """The same mix with all its ranges ``factor`` times as far from where nothing disturbs.
 
         Raises:
             ParameterError: if a range then holds what cannot be, such as a friction below 0.
@@ -140,13 +137,10 @@ class DisturbanceDistribution(Checked):
             raise ParameterError(f"the mix {factor:g} times as severe: {text}") from None
 
     def severity(self, draw: DisturbanceSample) -> float:
-        """Severity of a draw for this mix: root mean square of its shares of the ranges.
+        """Severity of a ``draw`` of this mix: root mean square of its shares of the ranges.
 
         Each share is a number's distance from where nothing disturbs over the distance of its
         range's end on that side. Ranges of no width are left out, as all trials share them.
-
-        Args:
-            draw: of this mix.
         """
         shares = []
         for name in _DRAWN:
@@ -205,10 +199,7 @@ class CampaignConfig(Checked):
         return self.mix.draw(item_seed(self.seed, number))
 
     def trial(self, number: Index) -> tuple[Experiment, PreparedExperiment]:
-        """A trial's experiment, to be written and to be run.
-
-        Args:
-            number: of the trial, from 0.
+        """The experiment of the trial with a ``number`` from 0, to be written and to be run.
 
         Raises:
             TemplateControlError: if robot or gait is not to be had.
@@ -231,15 +222,11 @@ class CampaignConfig(Checked):
             ),
             "start": (z[0] * (1.0 + draw.speed), z[1] + draw.height * scale.length, z[2]),
             "pushes": (Push(impulse, int(step), phase, seconds, direction),),
-            "sensors": SensorOptions(
-                noise=draw.noise, seed=item_seed(self.seed, number) % 2**_SEED_BITS
-            ),
+            # Integers of TOML have 63 bits.
+            "sensors": SensorOptions(noise=draw.noise, seed=item_seed(self.seed, number) % 2**63),
             "delay": round(draw.delay * scale.time / world.time_step) * world.time_step,
         }
         return replace(self.experiment.resolved(), **disturbed), replace(where, **disturbed)
-
-
-_SEED_BITS = 63  # that TOML can say
 
 
 class Trial(NamedTuple):

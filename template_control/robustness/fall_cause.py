@@ -26,13 +26,8 @@ def fall_cause(record: Record) -> str:
     ``failed QP``; ``torque limit``: a joint is at its limit for 20 ms on end; ``slip``: a loaded
     foot slides by 2 % of l0, of a free robot in any direction; ``stumble``: a foot is pressed
     backwards by more than friction can; ``reach``: a loaded leg is straight; ``late``: no section
-    for 1.3 step durations. Times are those of the reference template.
-
-    Args:
-        record: a run that fell, every sample kept.
-
-    Returns:
-        The name; "none of these" if there is none.
+    for 1.3 step durations; or ``none of these``. Times are those of the reference template. The
+    ``record`` is of a run that fell, every sample kept.
     """
     begin = record.section_time[max(len(record.section_time) - _LOOKED_AT, 0)]
     since = int(np.searchsorted(record.time, begin))

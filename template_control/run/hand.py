@@ -85,10 +85,7 @@ class Hand:
         self._ask(Push(impulse, duration=duration, direction=direction, time=0.0))
 
     def set_friction(self, friction: float) -> None:
-        """Change the friction of the ground; the controller does not know it.
-
-        Args:
-            friction: Coulomb coefficient between foot and ground.
+        """Change the Coulomb ``friction`` between feet and ground; the controller does not know it.
 
         Raises:
             ParameterError: if it is not positive, or the plant cannot change it.

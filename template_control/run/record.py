@@ -175,10 +175,7 @@ class Record(Facts):
     to_xarray = tables.to_xarray
 
     def plot(self, figure: str = "stick_diagram") -> Any:
-        """Matplotlib figure of the run, as :func:`template_control.plot` draws it.
-
-        Args:
-            figure: its name, a key of :data:`template_control.view.FIGURES`.
+        """Matplotlib ``figure`` of the run, a key of :data:`template_control.view.FIGURES`.
 
         Raises:
             ParameterError: if there is no such figure.

@@ -332,10 +332,9 @@ class Recorder:
         return {name: values.reshape(-1, *shape) for (name, shape), values in columns}
 
     def latest(self, count: int) -> dict[str, Array]:
-        """The last ticks, sampled or not, as the record's fields name their columns.
+        """The last ``count`` ticks, sampled or not, as the record's fields name their columns.
 
-        Args:
-            count: of ticks, at most 1024; there may be fewer.
+        They are 1024 at most; there may be fewer.
         """
         rows = self._block[: self.ticks - self._block_start][-count:]
         if len(rows) < count:
@@ -353,10 +352,7 @@ class Recorder:
     ) -> Record:
         """The run so far.
 
-        Args:
-            fall_reason: why the robot fell; "" where it did not.
-            interrupted: whether Ctrl-C ended the run.
-            error: that ended it, on one line.
+        Arguments as for :class:`~.facts.Facts`; the error is on one line.
         """
         self._close_block()
         kind = _kind_of(self.controller.robot)

@@ -116,10 +116,7 @@ class OwnPlanner(Checked):
     path: str
 
     def make(self, gait: Gait) -> Planner:
-        """The planner.
-
-        Args:
-            gait: that it is to lead to.
+        """The planner that is to lead to a ``gait``.
 
         Raises:
             ParameterError: if there is no such class, or what it makes is no planner.

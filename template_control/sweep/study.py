@@ -78,10 +78,7 @@ class Study(Checked):
         return sample(self.draws, self.seed, **self.sample)
 
     def trial(self, item: Item) -> Experiment:
-        """Experiment of a trial.
-
-        Args:
-            item: values of the keys that change.
+        """Experiment of a trial; ``item`` are values of the keys that change.
 
         Raises:
             ParameterError: naming the key that is unknown, or whose value does not fit.

@@ -32,9 +32,6 @@ from template_control.terminal import bar, plain_console
 Item = dict[str, Any]
 
 
-_MOST_DRAWS = 10_000_000
-
-
 @dataclass(frozen=True)
 class SweepResult:
     """Results of a sweep, in the order of its items.
@@ -57,13 +54,9 @@ class SweepResult:
         return {i: error for i, error in enumerate(self.errors) if error is not None}
 
     def column(self, name: str | None = None) -> Array:
-        """One entry of every result, or the results themselves, as numbers.
+        """(n, ...) one entry of every result as numbers, NaN where an item failed.
 
-        Args:
-            name: the entry, of results that are dictionaries; None for the results.
-
-        Returns:
-            (n, ...) with NaN where an item failed.
+        ``name`` is the entry's, of results that are dictionaries; None: the results themselves.
 
         Raises:
             SweepError: if a result has no such entry, or it is not numbers of one shape.
@@ -133,7 +126,7 @@ def sample(count: int, seed: int, **ranges: tuple[float, float]) -> list[Item]:
     Raises:
         SweepError: if a range is not two finite numbers, low first.
     """
-    count = check("count", count, Annotated[int, Range(0, _MOST_DRAWS)], SweepError)
+    count = check("count", count, Annotated[int, Range(0, 10_000_000)], SweepError)
     seed = check("seed", seed, Index, SweepError)
     for name, bounds in ranges.items():
         pair = check(f"range {name}", bounds, tuple[float, float], SweepError)
