@@ -326,7 +326,7 @@ def on_slope(gait: WalkingGait, slope: Slope) -> WalkingGait:
         here = ReturnMap(own, gait.stride).linearise(z, u)
         pushed = replace(own, assist=own.assist + change)
         there, outcome = ReturnMap(pushed, gait.stride).step(z, u)
-        if Outcome.SECTION not in (here.outcome, outcome):
+        if not here.outcome == outcome == Outcome.SECTION:
             break
         by_state = (here.state_jacobian - np.eye(3))[:, 1:]
         by_controls = here.control_jacobian[:, slots] * units

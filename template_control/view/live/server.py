@@ -42,7 +42,7 @@ def _closed_to_others() -> Iterator[None]:
     def guarded(*args: Any, process_request: Callable[..., Any], **options: Any) -> Any:
         def check(connection: Any, request: Any) -> Any:
             hosts, origins = (request.headers.get_all(name) for name in ("Host", "Origin"))
-            if len(hosts) == 1 and is_own(hosts[0], *(origins or [None])):
+            if len(hosts) == 1 and all(is_own(hosts[0], one) for one in origins or [None]):
                 return process_request(connection, request)
             return connection.respond(HTTPStatus.FORBIDDEN, "this page is driven from itself\n")
 

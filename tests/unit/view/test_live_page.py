@@ -166,9 +166,13 @@ def test_the_server_refuses_foreign_pages_and_taken_ports():
     server = PageServer(None)
     try:
         port = int(re.search(r":(\d+)/", server.url)[1])
-        for origin, status in (("http://evil.example", 403), (f"http://127.0.0.1:{port}", 200)):
+        own, foreign = f"http://127.0.0.1:{port}", "http://evil.example"
+        for origins, status in ([foreign], 403), ([own, foreign], 403), ([own], 200):
             asked = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
-            asked.request("GET", "/", headers={"Origin": origin})
+            asked.putrequest("GET", "/")
+            for origin in origins:
+                asked.putheader("Origin", origin)
+            asked.endheaders()
             assert asked.getresponse().status == status
             asked.close()
         with pytest.raises(ParameterError, match=rf"port {port} \(Address already in use\)"):
