@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numba import types
 from numba.experimental import structref
 from numba.extending import intrinsic
 
 from template_control.compiled import compiled
+
+
+def structure(**fields: Any) -> np.dtype[np.void]:
+    """Type of a structured array: of each field its type, or type and shape."""
+    return np.dtype(list(fields.items()), align=True)
 
 
 class Number:

@@ -17,17 +17,14 @@ from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
 from template_control.robot.terms import onward
+from template_control.structured import structure
 
 _BASE = 2  # the first coordinates are the base's place
-_F = np.float64
-FRAME = np.dtype(
-    [
-        ("angle", _F),  # of the ground, uphill positive [rad]
-        ("turn", _F, (_BASE, _BASE)),  # vectors of the world into axes that lean as it does
-        ("shift", _F, (_BASE,)),  # of places, once they are turned [m]
-        ("on", _F),  # 1; -1 if these axes' x points the other way than theirs
-    ],
-    align=True,
+FRAME = structure(
+    angle=float,  # of the ground, uphill positive [rad]
+    turn=(float, (_BASE, _BASE)),  # vectors of the world into axes that lean as it does
+    shift=(float, (_BASE,)),  # of places, once they are turned [m]
+    on=float,  # 1; -1 if these axes' x points the other way than theirs
 )
 """Axes that lean with the ground, and may be turned round about the normal to it."""
 

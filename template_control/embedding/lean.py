@@ -20,7 +20,7 @@ from template_control.errors import ParameterError
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import RATE, SPEED, Scale, tuned
-from template_control.structured import Number
+from template_control.structured import Number, structure
 
 LEAN_RATE = 0.1
 """Rate at which the lean changes at most [rad/s, of the reference template]."""
@@ -100,17 +100,13 @@ class LeanOptions(Checked):
         return upright if lean is None else lean.at(goal.wanted_speed)
 
 
-_F = np.float64
-LEAN = np.dtype(
-    [
-        ("goal", _F),  # mean pitch of the present stride [rad]
-        ("mean", _F),  # mean pitch that is wanted now, on its way to the goal [rad]
-        ("correction", _F),  # what the reference adds to it [rad]
-        ("rate", _F),  # at which the mean changes at most [rad/s]
-        ("sum", _F),  # of the mean's error over the stride [rad s]
-        ("time", _F),  # of the stride so far [s]
-    ],
-    align=True,
+LEAN = structure(
+    goal=float,  # mean pitch of the present stride [rad]
+    mean=float,  # mean pitch that is wanted now, on its way to the goal [rad]
+    correction=float,  # what the reference adds to it [rad]
+    rate=float,  # at which the mean changes at most [rad/s]
+    sum=float,  # of the mean's error over the stride [rad s]
+    time=float,  # of the stride so far [s]
 )
 """Lean of the trunk."""
 

@@ -25,6 +25,7 @@ from template_control.slip.automaton.vocabulary import Event, Leg, Phase, Reset
 from template_control.slip.dynamics.guards import guard
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.similarity import Scale, tuned
+from template_control.structured import structure
 from template_control.whole_body.stack import TaskStack
 
 PLACED = {Reset.PLACE_REAR: Leg.REAR, Reset.PLACE_FRONT: Leg.FRONT}
@@ -57,19 +58,15 @@ class GuardOptions(Checked):
     liftoff_angle: Annotated[float, Range(0.0, np.pi, above=True, below=True)] | None = tuned(None)
 
 
-_F, _I = np.float64, np.int64
 _OTHER_LEG = (Reset.PLACE_FRONT, Reset.SHIFT, Reset.SWAP)
 _MOST_EDGES = 8  # of a node, to other nodes
 
-GUARDS = np.dtype(
-    [
-        ("rest_length", _F),  # l0 [m]
-        ("liftoff_angle", _F),  # of the options [rad]; NaN: the template's
-        ("shortest_swing", _F),  # [s]
-        ("earliest", _F),  # touchdown behind the CoM before it is due [s]
-        ("overstretch", _F),  # of a rear leg that is let go [m]
-    ],
-    align=True,
+GUARDS = structure(
+    rest_length=float,  # l0 [m]
+    liftoff_angle=float,  # of the options [rad]; NaN: the template's
+    shortest_swing=float,  # [s]
+    earliest=float,  # touchdown behind the CoM before it is due [s]
+    overstretch=float,  # of a rear leg that is let go [m]
 )
 """Constants of the robot's guards."""
 
@@ -139,24 +136,21 @@ def set_guards(data: Any, parameters: SlipParameters, options: GuardOptions) -> 
 
 
 _FLAGS = ("momentum_speed", "rolling_contact", "trim_momentum", "follow_curve", "settles")
-MODE = np.dtype(
-    [
-        ("node", _I),  # its number on the automaton
-        ("stances", _I),  # legs that carry: the rear one, or both
-        ("swings", _I),  # legs in the air that have a foothold to go to
-        ("swing_leg", _I, (2,)),  # which
-        ("next_touchdown_leg", _I),  # the leg that is to touch down; -1: none
-        ("edges", _I),  # to other nodes
-        ("event", _I, (_MOST_EDGES,)),  # of each
-        ("placed", _I, (_MOST_EDGES,)),  # the leg that each puts on the ground; -1: none
-        ("passed", _I, (_MOST_EDGES,)),  # whether each has been taken where VLO has come
-        ("by_direction", _I),  # whether the clock is the direction of the CoM, not the time
-        *((flag, _I) for flag in _FLAGS),  # of the phase's entry in the table
-        ("estimate_load", _I),  # and a task gives the feedback
-        ("unloads", _I, (2,)),  # whether each leg has its normal force kept near the template's
-        ("unloading", _F),  # time over which it gives its load up before it lifts off [s]; 0: none
-    ],
-    align=True,
+MODE = structure(
+    node=np.int64,  # its number on the automaton
+    stances=np.int64,  # legs that carry: the rear one, or both
+    swings=np.int64,  # legs in the air that have a foothold to go to
+    swing_leg=(np.int64, (2,)),  # which
+    next_touchdown_leg=np.int64,  # the leg that is to touch down; -1: none
+    edges=np.int64,  # to other nodes
+    event=(np.int64, (_MOST_EDGES,)),  # of each
+    placed=(np.int64, (_MOST_EDGES,)),  # the leg that each puts on the ground; -1: none
+    passed=(np.int64, (_MOST_EDGES,)),  # whether each has been taken where VLO has come
+    by_direction=np.int64,  # whether the clock is the direction of the CoM, not the time
+    **dict.fromkeys(_FLAGS, np.int64),  # of the phase's entry in the table
+    estimate_load=np.int64,  # and a task gives the feedback
+    unloads=(np.int64, (2,)),  # whether each leg has its normal force kept near the template's
+    unloading=float,  # time over which it gives its load up before it lifts off [s]; 0: none
 )
 """A mode, as compiled code reads it."""
 

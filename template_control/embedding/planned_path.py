@@ -20,35 +20,32 @@ from template_control.arrays import Array
 from template_control.compiled import compiled
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 from template_control.slip.path import at_direction, leg_forces, sample
+from template_control.structured import structure
 
 _TOUCHDOWN = int(Event.TOUCHDOWN)
-_F, _I = np.float64, np.int64
-PATH = np.dtype(
-    [
-        # -- the robot's place on it --
-        ("time", _F),  # along the path [s]
-        ("offset", _F),  # of the point whose direction is the phase, ahead of the CoM [m]
-        ("fresh", _I),  # whether the path begins at this tick
-        ("forces", _F, (2, 2)),  # leg forces of the template there, rear and front [N]
-        # -- the plan, written when it changes --
-        # m, g towards the ground and back along it, l0, assist of two legs, half a foot's length
-        ("body", _F, (6,)),
-        ("event_times", _F, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
-        ("landing_x", _F, (2,)),  # of each foot's next foothold [m]; NaN: none
-        ("landing_time", _F, (2,)),  # [s]; inf: never
-        ("toe", _F),  # x of the template's rear toe [m]
-        ("touchdown_angle", _F),  # of the stride [rad]
-        ("step_length", _F),  # of the planner's gait [m]
-        ("step_duration", _F),  # of it [s]
-        ("planned_at", _F),  # when the path began [s]
-        ("viable", _I),  # whether the template completes the path's strides, and goes on
-        ("without_touchdown", _I),  # whether an overdue touchdown has been taken off the path
-        # -- when it is planned anew --
-        ("patience", _F),  # with a touchdown [s]
-        ("interval", _F),  # between plans [s]
-        ("speed", _F),  # deviation of the forward speed [m/s]
-    ],
-    align=True,
+PATH = structure(
+    # -- the robot's place on it --
+    time=float,  # along the path [s]
+    offset=float,  # of the point whose direction is the phase, ahead of the CoM [m]
+    fresh=np.int64,  # whether the path begins at this tick
+    forces=(float, (2, 2)),  # leg forces of the template there, rear and front [N]
+    # -- the plan, written when it changes --
+    # m, g towards the ground and back along it, l0, assist of two legs, half a foot's length
+    body=(float, (6,)),
+    event_times=(float, (NUM_EVENTS,)),  # of each event's next occurrence [s]; inf: none
+    landing_x=(float, (2,)),  # of each foot's next foothold [m]; NaN: none
+    landing_time=(float, (2,)),  # [s]; inf: never
+    toe=float,  # x of the template's rear toe [m]
+    touchdown_angle=float,  # of the stride [rad]
+    step_length=float,  # of the planner's gait [m]
+    step_duration=float,  # of it [s]
+    planned_at=float,  # when the path began [s]
+    viable=np.int64,  # whether the template completes the path's strides, and goes on
+    without_touchdown=np.int64,  # whether an overdue touchdown has been taken off the path
+    # -- when it is planned anew --
+    patience=float,  # with a touchdown [s]
+    interval=float,  # between plans [s]
+    speed=float,  # deviation of the forward speed [m/s]
 )
 """The path that the supervisor has planned, and the robot's place on it."""
 

@@ -17,7 +17,7 @@ from template_control.robot.terms import UP
 from template_control.slip.automaton.vocabulary import Leg
 from template_control.slip.maps.section import Section
 from template_control.slip.scenario.route import StrideGoal
-from template_control.structured import Number
+from template_control.structured import Number, structure
 
 
 @compiled
@@ -36,16 +36,12 @@ def rolled(toe: float, touchdown_angle: float, radius: float) -> float:
     return toe - radius * (0.5 * np.pi - touchdown_angle)
 
 
-_F = np.float64
-SENSED = np.dtype(
-    [
-        ("state", _F, (4,)),  # x, y, dx/dt, dy/dt of the CoM, y over the template's ground
-        ("toes", _F, (2,)),  # x of the rear and the front foot [m]
-        ("ground", _F),  # height of the template's ground [m]
-        ("rear_shift", _F),  # of the template's rear toe from the foot [m]
-        ("pre_impact_velocity", _F, (2,)),  # this tick's, if nothing has hit the robot [m/s]
-    ],
-    align=True,
+SENSED = structure(
+    state=(float, (4,)),  # x, y, dx/dt, dy/dt of the CoM, y over the template's ground
+    toes=(float, (2,)),  # x of the rear and the front foot [m]
+    ground=float,  # height of the template's ground [m]
+    rear_shift=float,  # of the template's rear toe from the foot [m]
+    pre_impact_velocity=(float, (2,)),  # this tick's, if nothing has hit the robot [m/s]
 )
 """The robot in the template's terms; :class:`TemplateState` explains the first two."""
 

@@ -26,6 +26,7 @@ from template_control.robot.terms import MOST_CONTACTS, UP, onward
 from template_control.slip.automaton.vocabulary import Reset
 from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.similarity import ACCELERATION, LENGTH, SPEED, TIME, Scale, scaled, tuned
+from template_control.structured import structure
 
 
 @dataclass(frozen=True)
@@ -74,21 +75,17 @@ class SwingOptions(Checked):
     start: NotNegative = tuned(0.0)
 
 
-_F, _I = np.float64, np.int64
 _SHAPE = tuple(f.name for f in fields(SwingOptions))
 
-FEET = np.dtype(
-    [
-        ("roles", _I, (2,)),  # the foot that is the rear leg's, and the front leg's
-        ("landed", _I),  # the foot that landed last; the template's ground is there
-        ("swing_time", _F, (2,)),  # time since each foot lifted off [s]
-        ("elapsed", _F, (2,)),  # duration of the reference's swing so far [s]
-        ("over", _F, (2,)),  # height that the reference keeps, above a wall it met [m]
-        ("spread", _F, (MOST_CONTACTS, 2)),  # of each contact from its foot, as the trunk faces [m]
-        ("lifted", _F, (MOST_CONTACTS, 3)),  # the same where the foot lifted off [m]
-        *((name, _F, (2,)) for name in _SHAPE),  # of each foot's ``SwingOptions``
-    ],
-    align=True,
+FEET = structure(
+    roles=(np.int64, (2,)),  # the foot that is the rear leg's, and the front leg's
+    landed=np.int64,  # the foot that landed last; the template's ground is there
+    swing_time=(float, (2,)),  # time since each foot lifted off [s]
+    elapsed=(float, (2,)),  # duration of the reference's swing so far [s]
+    over=(float, (2,)),  # height that the reference keeps, above a wall it met [m]
+    spread=(float, (MOST_CONTACTS, 2)),  # of each contact from its foot, as the trunk faces [m]
+    lifted=(float, (MOST_CONTACTS, 3)),  # the same where the foot lifted off [m]
+    **dict.fromkeys(_SHAPE, (float, (2,))),  # of each foot's ``SwingOptions``
 )
 """Roles and swings of the feet; the references themselves are among those of the tasks."""
 

@@ -43,7 +43,7 @@ from template_control.robot.library import load_robot
 from template_control.robot.terms import LEGS, UP, onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.dynamics.model import ORDER
-from template_control.structured import keep
+from template_control.structured import keep, structure
 from template_control.warm_up import Part
 from template_control.whole_body.problem import solve_free
 from template_control.whole_body.solver import WholeBodyQp
@@ -52,53 +52,42 @@ from template_control.whole_body.task import References
 from template_control.whole_body.task_rows import write_rows
 from template_control.whole_body.tasks import PostureTask
 
-_F, _I = np.float64, np.int64
-
-LOAD = np.dtype(
-    [
-        ("sum", _F),  # of the vertical acceleration's feedback over the stride [m/s]
-        ("time", _F),  # over which it was summed [s]
-    ],
-    align=True,
+LOAD = structure(
+    sum=float,  # of the vertical acceleration's feedback over the stride [m/s]
+    time=float,  # over which it was summed [s]
 )
 """Load estimate, within a stride."""
 
-TICK = np.dtype(
-    [
-        ("time", _F),  # since the start [s]
-        ("friction_margin", _F),  # share of the friction that the cones use
-        ("trim", _F),  # acceleration that the momentum trim adds in its phases [m/s^2]
-        ("frame", FRAME),
-        ("mode", MODE),
-        ("contacts", CONTACTS),
-        ("slides", SLIDES),
-        ("feet", FEET),
-        ("sensed", SENSED),
-        ("guards", GUARDS),
-        ("path", PATH),
-        ("lean", LEAN),
-        ("load", LOAD),
-        ("lateral", LATERAL),
-    ],
-    align=True,
+TICK = structure(
+    time=float,  # since the start [s]
+    friction_margin=float,  # share of the friction that the cones use
+    trim=float,  # acceleration that the momentum trim adds in its phases [m/s^2]
+    frame=FRAME,
+    mode=MODE,
+    contacts=CONTACTS,
+    slides=SLIDES,
+    feet=FEET,
+    sensed=SENSED,
+    guards=GUARDS,
+    path=PATH,
+    lean=LEAN,
+    load=LOAD,
+    lateral=LATERAL,
 )
 """State of the controller from tick to tick."""
 
-SNAPSHOT = np.dtype(
-    [
-        ("time", _F),
-        ("phase", _F),
-        ("node", _I),  # its number on the automaton
-        ("rear", _I),
-        ("stands", np.bool_),
-        ("template_com", _F, (2,)),
-        ("template_velocity", _F, (2,)),
-        ("template_force", _F, (LEGS, 2)),
-        ("swing_reference", _F, (LEGS, 2)),
-        ("sway", _F, (2,)),
-        ("side_reference", _F, (LEGS,)),
-    ],
-    align=True,
+SNAPSHOT = structure(
+    time=float,
+    phase=float,
+    node=np.int64,  # its number on the automaton
+    rear=np.int64,
+    stands=np.bool_,
+    template_com=(float, (2,)),
+    template_velocity=(float, (2,)),
+    template_force=(float, (LEGS, 2)),
+    swing_reference=(float, (LEGS, 2)),
+    sway=(float, (2,)),
+    side_reference=(float, (LEGS,)),
 )
 """Numbers of a :class:`~.state.Snapshot`, which explains them."""
 

@@ -30,6 +30,7 @@ from template_control.arrays import Array
 from template_control.cholesky import cholesky
 from template_control.compiled import compiled, compiled_into
 from template_control.robot.terms import MOST_CONTACTS, PATCH, UP
+from template_control.structured import structure
 from template_control.whole_body.elimination import eliminate
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
@@ -39,25 +40,20 @@ _GRID = 2.0**24  # steps of a torque up to its limit
 SINGULAR, BOUNDED, FREE, BRAKED = 0, 1, 2, 3
 """No problem; one whose constraints act; one where none does; one that bounds accelerations."""
 
-_F, _I = np.float64, np.int64
-
-QP_DATA = np.dtype(
-    [
-        ("force_cost", _F),  # of the contact forces' distance from the wanted ones, per (m g)^2
-        ("sole_share", _F),  # share of a sole in which its centre of pressure is kept
-        ("torque_cost", _F),  # of the joint torques, per squared limit
-        ("friction", _F),  # coefficient that the cones are built with
-        ("contact_damping", _F),  # brings a foot that landed sliding to rest [1/s]
-        ("speed_share", _F),  # share of its limit from which on a joint's speed is bounded
-        ("stop_share", _F),  # share of its limit from which on a joint slows down before its stop
-        ("stop_time", _F),  # by which a stop is looked at before a joint is there [s]
-        ("load", _F),  # ratio of the real to the modelled inertia
-        ("contacts", _I),  # number of contacts on the ground
-        ("contact", _I, (MOST_CONTACTS,)),  # which
-        ("force", _F, (MOST_CONTACTS, PATCH)),  # to stay near, of each, by row [N, N m]
-        ("cap", _F, (MOST_CONTACTS,)),  # largest normal force of each; inf: none [N]
-    ],
-    align=True,
+QP_DATA = structure(
+    force_cost=float,  # of the contact forces' distance from the wanted ones, per (m g)^2
+    sole_share=float,  # share of a sole in which its centre of pressure is kept
+    torque_cost=float,  # of the joint torques, per squared limit
+    friction=float,  # coefficient that the cones are built with
+    contact_damping=float,  # brings a foot that landed sliding to rest [1/s]
+    speed_share=float,  # share of its limit from which on a joint's speed is bounded
+    stop_share=float,  # share of its limit from which on a joint slows down before its stop
+    stop_time=float,  # by which a stop is looked at before a joint is there [s]
+    load=float,  # ratio of the real to the modelled inertia
+    contacts=np.int64,  # number of contacts on the ground
+    contact=(np.int64, (MOST_CONTACTS,)),  # which
+    force=(float, (MOST_CONTACTS, PATCH)),  # to stay near, of each, by row [N, N m]
+    cap=(float, (MOST_CONTACTS,)),  # largest normal force of each; inf: none [N]
 )
 """The stance of a tick, and the constants of the QP."""
 

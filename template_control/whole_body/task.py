@@ -14,34 +14,29 @@ import numpy as np
 
 from template_control.arrays import Array, IntArray
 from template_control.robot.terms import LEGS, MOST_CONTACTS
-from template_control.structured import Number
+from template_control.structured import Number, structure
 
 BIAS, DESIRED, WEIGHT = 0, 1, 2
 """Columns of a row behind its (nv,) Jacobian."""
 
 
-_F, _I = np.float64, np.int64
-
-REFERENCES = np.dtype(
-    [
-        ("com", _F, (6,)),
-        ("com_now", _F, (4,)),
-        ("com_push", _F),
-        ("pitch", _F),
-        ("lean", _F, (3,)),
-        ("spin", _F),
-        ("feet", _I, (LEGS,)),
-        ("foot", _F, (LEGS, 2, 3)),
-        ("side", _F, (LEGS, 3)),
-        ("furthest", _F, (LEGS,)),
-        ("offset", _F, (MOST_CONTACTS, 3, 3)),
-        ("stands", _I, (MOST_CONTACTS,)),
-        ("lead", _F),
-        ("ahead", _F),
-        ("sway", _F),
-        ("lift", _F),
-    ],
-    align=True,
+REFERENCES = structure(
+    com=(float, (6,)),
+    com_now=(float, (4,)),
+    com_push=float,
+    pitch=float,
+    lean=(float, (3,)),
+    spin=float,
+    feet=(np.int64, (LEGS,)),
+    foot=(float, (LEGS, 2, 3)),
+    side=(float, (LEGS, 3)),
+    furthest=(float, (LEGS,)),
+    offset=(float, (MOST_CONTACTS, 3, 3)),
+    stands=(np.int64, (MOST_CONTACTS,)),
+    lead=float,
+    ahead=float,
+    sway=float,
+    lift=float,
 )
 """Values that tasks read with the robot's state; :class:`References` explains the fields."""
 

@@ -15,6 +15,7 @@ import numpy as np
 from template_control.arrays import Array
 from template_control.compiled import compiled, constant
 from template_control.robot.terms import MOST_SPARE, UP, onward
+from template_control.structured import structure
 from template_control.whole_body.task import BIAS, DESIRED, WEIGHT
 
 _PITCH = 2  # place of a planar robot's pitch in q
@@ -23,18 +24,13 @@ _YAW = 2
 # An error of the yaw counts as this much at most in a run [rad]: more momentum about the vertical
 # than it asks for is more than ab- and adduction have, and roll is lost with it.
 _MOST_YAW = 0.2
-_F, _I = np.float64, np.int64
-
-TASK = np.dtype(
-    [
-        ("kind", _I),  # which formula: a task's ``kind``
-        ("first", _I),  # row of the stack
-        ("leg", _I),  # role of the task's foot
-        ("contact", _I),  # which one of the foot's group
-        ("gains", _F, (4,)),  # kp and kd, twice where the task has two pairs
-        ("weight", _F, (3,)),  # of the first rows
-    ],
-    align=True,
+TASK = structure(
+    kind=np.int64,  # which formula: a task's ``kind``
+    first=np.int64,  # row of the stack
+    leg=np.int64,  # role of the task's foot
+    contact=np.int64,  # which one of the foot's group
+    gains=(float, (4,)),  # kp and kd, twice where the task has two pairs
+    weight=(float, (3,)),  # of the first rows
 )
 """A task as compiled code reads it."""
 

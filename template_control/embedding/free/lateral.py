@@ -42,6 +42,7 @@ from template_control.slip.lateral.placing import (
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.path import TemplatePath
 from template_control.slip.similarity import Scale, scaled
+from template_control.structured import structure
 
 BEYOND = 0.03
 """A foothold that is wanted further than this beyond its bounds is out of reach [m, of the
@@ -93,46 +94,42 @@ def early_touchdown(
     return best
 
 
-_F, _I = np.float64, np.int64
-LATERAL = np.dtype(
-    [
-        ("rolling", _F),  # of the feet, see pivot
-        ("feet", _I, (2,)),  # that were rear and front at the start of the path
-        ("stood", _F, (2, 2)),  # x and y where each foot stands, or stood last [m]
-        # -- the turn of a run's stride --
-        ("turn", _F),  # of the heading in it [rad]
-        ("begun", _F),  # when it began [s]
-        ("duration", _F),  # of it [s]
-        ("bank", _F),  # roll that the turn's curve asks for [rad]
-        ("bank_rate", _F),  # at which the roll goes there [rad/s]
-        ("spin", _F),  # angular momentum about the vertical [N m s]
-        # Of the periodic motion, at the section of the foot that landed last: y of the CoM from it,
-        # and dy/dt [m, m/s].
-        ("cycle", _F, (2,)),
-        ("section_began", _F),  # time of the last section [s]
-        # -- the plan of a stand --
-        ("unit", _F),  # of time, over the reference template's
-        ("pressure", _F),  # y of the centre of pressure [m]; NaN: not planned
-        ("pressure_at", _F),  # when it was planned [s]
-        # Whether the capture point is further off the ground under both feet, on which it is held,
-        # than the trunk's roll leads it back.
-        ("leaves", _I),
-        ("catches", _I),  # whether a step catches it
-        ("half_width", _F),  # how far to either side of its middle a foot bears; 0 of a point [m]
-        # -- the foothold: see Placement --
-        ("step", _F),  # to it in the gait, see LateralAim [m]
-        ("steps", _F, (2,)),  # the least and the largest, to the left [m]
-        ("second_step", _F),  # from it to the one after it, to the left [m]
-        ("hold", _F),  # time before touchdown from which on it is kept [s]
-        ("placed", _I),  # whether there is one
-        ("y", _F),
-        ("wanted", _F),
-        ("left", _F),
-        ("com", _F),
-        ("expected", _F, (2,)),
-        ("slope", _F, (2,)),
-    ],
-    align=True,
+LATERAL = structure(
+    rolling=float,  # of the feet, see pivot
+    feet=(np.int64, (2,)),  # that were rear and front at the start of the path
+    stood=(float, (2, 2)),  # x and y where each foot stands, or stood last [m]
+    # -- the turn of a run's stride --
+    turn=float,  # of the heading in it [rad]
+    begun=float,  # when it began [s]
+    duration=float,  # of it [s]
+    bank=float,  # roll that the turn's curve asks for [rad]
+    bank_rate=float,  # at which the roll goes there [rad/s]
+    spin=float,  # angular momentum about the vertical [N m s]
+    # Of the periodic motion, at the section of the foot that landed last: y of the CoM from it,
+    # and dy/dt [m, m/s].
+    cycle=(float, (2,)),
+    section_began=float,  # time of the last section [s]
+    # -- the plan of a stand --
+    unit=float,  # of time, over the reference template's
+    pressure=float,  # y of the centre of pressure [m]; NaN: not planned
+    pressure_at=float,  # when it was planned [s]
+    # Whether the capture point is further off the ground under both feet, on which it is held,
+    # than the trunk's roll leads it back.
+    leaves=np.int64,
+    catches=np.int64,  # whether a step catches it
+    half_width=float,  # how far to either side of its middle a foot bears; 0 of a point [m]
+    # -- the foothold: see Placement --
+    step=float,  # to it in the gait, see LateralAim [m]
+    steps=(float, (2,)),  # the least and the largest, to the left [m]
+    second_step=float,  # from it to the one after it, to the left [m]
+    hold=float,  # time before touchdown from which on it is kept [s]
+    placed=np.int64,  # whether there is one
+    y=float,
+    wanted=float,
+    left=float,
+    com=float,
+    expected=(float, (2,)),
+    slope=(float, (2,)),
 )
 """The lateral half of a tick."""
 
