@@ -18,6 +18,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
+from template_control.embedding.planners.planner import Cause
 from template_control.slip.automaton.vocabulary import NUM_EVENTS, Event
 from template_control.slip.path import at_direction, leg_forces, sample
 from template_control.structured import structure
@@ -49,8 +50,10 @@ PATH = structure(
 )
 """The path that the supervisor has planned, and the robot's place on it."""
 
-KEPT, OVERDUE, STRAYED, LEADS_NOWHERE = range(4)
-"""Results of :func:`plan_is_due`: the path is kept, or why it is not."""
+KEPT = 0
+"""Result of :func:`plan_is_due` where the path is kept; else the value of a cause."""
+_OVERDUE, _STRAYED = int(Cause.OVERDUE.value), int(Cause.DEVIATION.value)
+_LEADS_NOWHERE = int(Cause.NO_FUTURE.value)
 
 
 @compiled
@@ -82,18 +85,17 @@ def move_clock(
 
 @compiled
 def plan_is_due(path: Any, lands: bool, deviation: float, phase_time: float, now: float) -> int:
-    """Why the path, of ``PATH``, is to be planned anew at the time ``now`` [s], or ``KEPT``.
+    """Value of the :class:`.Cause` to plan the path, of ``PATH``, anew, or ``KEPT``.
 
-    OVERDUE: the swing foot, which ``lands`` on it, should have found the ground by now. STRAYED: a
-    disturbance has carried the robot away from it, by ``deviation`` of the forward speed [m/s].
-    LEADS_NOWHERE: no stride goes on from it. ``phase_time`` is along it [s].
+    The swing foot ``lands`` on it; ``deviation`` from it is of the forward speed [m/s],
+    ``phase_time`` along it, at the time ``now`` [s].
     """
     if path.without_touchdown:
         return KEPT
     if lands and phase_time > path.event_times[_TOUCHDOWN] + path.patience:
-        return OVERDUE
+        return _OVERDUE
     if now - path.planned_at <= path.interval:
         return KEPT
     if abs(deviation) > path.speed and phase_time > path.interval:
-        return STRAYED
-    return KEPT if path.viable else LEADS_NOWHERE
+        return _STRAYED
+    return KEPT if path.viable else _LEADS_NOWHERE

@@ -62,26 +62,19 @@ it is unexpected [m], for the reference template."""
 _TARGETS = {size: Annotated[Array, Shape((size,))] for size in (2, 3)}
 
 
+@dataclass(frozen=True)
 class RoutePlanners:
     """Decisions at the sections of a route; its walks may break into a recovery's strides."""
 
-    def __init__(
-        self,
-        route: Route,
-        planners: Planners,
-        automaton: Automaton,
-        recovery: Recovery | None = None,
-    ) -> None:
-        self.route = route
-        self.planners = planners
-        self.automaton = automaton
-        self.recovery = recovery
+    route: Route
+    planners: Planners
+    automaton: Automaton
+    recovery: Recovery
 
     def reset(self) -> None:
         """Forget an earlier run."""
         asked(self.route.reset)
-        if self.recovery is not None:
-            self.recovery.reset()
+        self.recovery.reset()
         for planner in self.planners.values():
             asked(planner.reset)
 
@@ -98,8 +91,6 @@ class RoutePlanners:
         ``z`` (n,) is the state at the section, at the time ``now`` [s]. A ParameterError names the
         route's class, if it asks for no stride that there is.
         """
-        if self.recovery is None:
-            return self._goal(self.route.next, section, z, now)
         goal = self.recovery.goal(section, z)
         if goal is None:
             goal = self._goal(self.route.next, section, z, now)
@@ -108,8 +99,7 @@ class RoutePlanners:
 
     def ahead(self, section: Section, z: Array, now: float) -> StrideGoal | None:
         """Goal that :meth:`next` would return here; neither the route nor the recovery goes on."""
-        goal = None if self.recovery is None else self.recovery.goal(section, z)
-        return goal or self._goal(self.route.ahead, section, z, now)
+        return self.recovery.goal(section, z) or self._goal(self.route.ahead, section, z, now)
 
     def beyond(self, goal: StrideGoal, section: Section) -> StrideGoal:
         """Goal of a stride from ``section`` after the route's end, which ``goal`` leads to.
@@ -239,40 +229,27 @@ class TemplateRollout:
 
     In ``curved`` nodes the planner's curve is followed, not the template's springs. ``scale`` are
     the template's units, by which tuned numbers are multiplied; ``height_error`` is that of the
-    ground under a foot that has landed, from which on it is unexpected [m].
+    ground under a foot that has landed, from which on it is unexpected [m]. ``ground`` is the
+    template on its present ground, ``simulator`` runs it.
     """
 
-    def __init__(self, planners: RoutePlanners, automaton: Automaton, curved: Set[str]) -> None:
-        self.planners = planners
-        self.automaton = automaton
-        self.curved = curved
-        self._parameters = planners.route.parameters
-        self.scale = Scale.of(self._parameters)
+    def __init__(self, planners: RoutePlanners, curved: Set[str]) -> None:
+        self.planners, self.automaton, self.curved = planners, planners.automaton, curved
+        self._level = self.ground = planners.route.parameters
+        self.scale = Scale.of(self.ground)
         self.height_error = HEIGHT_ERROR * self.scale.length
-        self._simulator = self._mirrored = StrideSimulator(self._parameters, automaton)
+        self.simulator = self._mirrored = StrideSimulator(self.ground, self.automaton)
         self._work = new_workspace()
 
     def set_ground(self, ground: SlipParameters) -> bool:
         """Run the template on ground of this slope and assist; True if it is other ground."""
-        p = replace(self._parameters, slope=ground.slope, assist=ground.assist)
-        if p == self._simulator.parameters:
+        p = replace(self._level, slope=ground.slope, assist=ground.assist)
+        if p == self.ground:
             return False
-        self._simulator = StrideSimulator(p, self.automaton)
+        self.ground, self.simulator = p, StrideSimulator(p, self.automaton)
         # Uphill is downhill for one who walks back.
         self._mirrored = StrideSimulator(replace(p, slope=-p.slope), self.automaton)
         return True
-
-    @property
-    def ground(self) -> SlipParameters:
-        """The template on its present ground."""
-        return self._simulator.parameters
-
-    def forward(self, node: str, sensed: TemplateState, state: Array, u: Array) -> Stride:
-        """The template's stride from a node on, in which its springs carry it.
-
-        ``sensed`` has the toes; ``state`` (4,) is x, y, dx/dt, dy/dt, ``u`` are controls by Slot.
-        """
-        return self._simulator.run(node, state, u, sensed.toes)
 
     def curve(
         self, node: str, sensed: TemplateState, state: Array, planner: Planner, decision: Decision
@@ -304,19 +281,21 @@ class TemplateRollout:
             section = section_of(self.automaton.sections(start)[1])
             z = section.of(last.state)
             then = self.planners.ahead(section, z, at) or self.planners.beyond(then, section)
-            context = Context(z, then.target, cause=Cause.FUTURE, lifted=_lifted(last))
+            swung = last.duration - last.time_of(Event.REAR_LIFTOFF)
+            lifted = inf if isnan(swung) else swung
+            context = Context(z, then.target, cause=Cause.FUTURE, lifted=lifted)
             ahead = decided(self.planners.of(then), context)
             whole = whole and ahead.lasting
             start = self.automaton.start(then.stride).name
             if start in self.curved:
                 break  # both feet stand: there is no foothold to know
-            strides.append(self._simulator.run(start, last.state, ahead.controls, last.toes))
+            strides.append(self.simulator.run(start, last.state, ahead.controls, last.toes))
             more -= 1
         return strides, whole and all(stride.completed for stride in strides)
 
     def ahead(self, node: Node, sensed: TemplateState) -> StrideEnd:
         """End of the present stride from here, by its controls."""
-        return rest(self._simulator, node.name, sensed.state, sensed.toes, self._work)
+        return rest(self.simulator, node.name, sensed.state, sensed.toes, self._work)
 
     def at_section(self, section: Section, sensed: TemplateState, last: SectionReport) -> Array:
         """(n,) section state that the template passes through, a little before or after it.
@@ -332,7 +311,7 @@ class TemplateRollout:
         if not node.stance:
             return here
         past = ahead > 0.0
-        simulator, dy = (self._mirrored, -dy) if past else (self._simulator, dy)
+        simulator, dy = (self._mirrored, -dy) if past else (self.simulator, dy)
         stride = simulator.run(node.name, [-abs(ahead), y, dx, dy], last.decision.controls)
         if not stride.completed:
             return here
@@ -359,9 +338,3 @@ class TemplateRollout:
             return None
         section = section_of(self.automaton.sections(before.name)[1])
         return section.mirror(section.of(past.state))
-
-
-def _lifted(stride: Stride) -> float:
-    """Time from the rear leg's liftoff to the end of a stride [s]; inf where there is none."""
-    since = stride.duration - stride.time_of(Event.REAR_LIFTOFF)
-    return inf if isnan(since) else since

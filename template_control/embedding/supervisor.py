@@ -15,13 +15,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.fitting import answered_or_none
-from template_control.embedding.planned_path import (
-    LEADS_NOWHERE,
-    OVERDUE,
-    PATH,
-    STRAYED,
-    plan_is_due,
-)
+from template_control.embedding.planned_path import KEPT, PATH, plan_is_due
 from template_control.embedding.planners.planner import (
     Cause,
     Context,
@@ -53,11 +47,6 @@ from template_control.slip.planning.catching import CatchingStep
 from template_control.slip.scenario.route import Route, StrideGoal
 from template_control.structured import Number
 
-_CAUSES = {
-    OVERDUE: Cause.OVERDUE,
-    STRAYED: Cause.DEVIATION,
-    LEADS_NOWHERE: Cause.NO_FUTURE,
-}
 _BARELY_BEYOND, _JUST_BEYOND = 1.002, 1.01
 """Lengths of a leg over l0 up to which a path that begins lets it go at once: any, and one that
 extends slowly. One further out that extends fast is being pushed off: where it was let go
@@ -122,8 +111,9 @@ class StrideSupervisor:
         # Speed at the stride's section less the wanted, and what came on top.
         self._speed_excess = 0.0
         self._recovery = recovery
-        self._planners = RoutePlanners(route, planners, automaton, recovery)
-        self._rollout = TemplateRollout(self._planners, automaton, curved)
+        breaks = recovery or Recovery(self.parameters)  # into nothing, as nothing is taken
+        self._planners = RoutePlanners(route, planners, automaton, breaks)
+        self._rollout = TemplateRollout(self._planners, curved)
         self.height_error = self._rollout.height_error
 
     def begin(self, section: Section) -> tuple[Planner, Node]:
@@ -219,14 +209,17 @@ class StrideSupervisor:
         """
         lands = node.edge(Event.TOUCHDOWN) is not None
         due = plan_is_due(self.data[0], lands, deviation, phase_time, now)
-        if due == STRAYED:
+        if due == KEPT:
+            return None
+        cause = Cause(due)
+        if cause is Cause.DEVIATION:
             self._speed_excess += deviation
-        if due == LEADS_NOWHERE and not self._recovering:
+        if cause is Cause.NO_FUTURE and not self._recovering:
             goes_on = self.decision.feasible and self.path.strides[0].completed
             retries = self.planner.retries or not goes_on
             if self._along_curve or not retries:  # a curve is left to its planner
                 return None
-        return _CAUSES.get(due)
+        return cause
 
     def replan(
         self,
@@ -344,7 +337,7 @@ class StrideSupervisor:
             self.goal, self.decision, first = curve_or_step(self._rollout, s, state)
             node = self.automaton.node(first.start)
         else:
-            first = self._rollout.forward(node.name, sensed, state, u)
+            first = self._rollout.simulator.run(node.name, state, u, sensed.toes)
         return self._take(node, first, state, sensed, now)
 
     def catch(

@@ -13,6 +13,7 @@ from template_control.embedding.planners import lqr
 from template_control.embedding.planners.lqr import LqrOptions, LqrPlanner
 from template_control.embedding.planners.modified import ModifiedOptions, ModifiedPlanner
 from template_control.embedding.planners.planner import Cause, Context, RestContext
+from template_control.embedding.recovery import Recovery
 from template_control.embedding.replanning import (
     AGILITY,
     SOONEST,
@@ -189,7 +190,7 @@ def test_after_a_turn_a_stride_is_decided_where_the_template_passes_its_section(
 def test_a_walk_after_a_run_forgets_what_its_steps_added_to_the_speed(gait, before, speed_kept):
     planner = LqrPlanner(gait)
     route = SteadyRoute.of(gait)
-    planners = RoutePlanners(route, {"w": planner, "rw": planner}, AUTOMATON)
+    planners = RoutePlanners(route, {"w": planner, "rw": planner}, AUTOMATON, Recovery(P))
     report, *_ = planners.decide(VLO, Context(gait.vlo), 0.0, NOTHING, None)
     planner.offset = np.array([0.02, -0.002, -0.05])
     goal = replace(report.goal, stride=before)
