@@ -300,7 +300,7 @@ class EmbeddingController:
         if self.lateral is not None:
             sideways = self.lateral.planner.follow(path, self.supervisor.feet)
         self._plan: tuple[Any, ...] = tuple(path.curve), sideways
-        self._room: tuple[Matrices, Array] | None = None  # all of ``_kept`` is to be kept anew
+        self._room: Matrices | None = None  # all of ``_kept`` is to be kept anew
 
     def _act(self, dt: float) -> Solution:
         """References, rows and torques."""

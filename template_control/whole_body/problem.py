@@ -107,12 +107,13 @@ def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
 
 
 class Matrices(NamedTuple):
-    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all from the third on.
+    """The QP in w, and how it is mapped back; :func:`assemble` overwrites all from ``a_map`` on.
 
     The last three are of the contacts on the ground, and work space.
     """
 
     torque_limit: Array  # (nu,) of the model [N m]
+    torque: Array  # (nu,) of the model's joints, as they were solved last [N m]
     bounds: Array  # (2, nu) least and greatest accelerations of the joints; (2, 0): none [rad/s^2]
     a_map: Array  # (nv, nu + 1) accelerations as an affine function of the torques
     f_map: Array  # (rows, nu + 1) the same of the contact forces, or wrenches of patches
@@ -153,23 +154,22 @@ def assemble(qp: Any, data: Any, arrays: tuple[Any, ...], tasks: Array, m: Matri
         m.factor[i, i] = p.torque_cost
         m.constraint[i, i] = 1.0
         m.lower[i], m.upper[i] = -1.0, 1.0
-    row = m.row
-    _add_tasks(m, tasks, row)
-    _add_contacts(p, r.mass * r.gravity, m, directions, row)
+    _add_tasks(m, tasks)
+    _add_contacts(p, r.mass * r.gravity, m, directions)
     if directions == PATCH:
-        _add_patches(p, r, m, row)
+        _add_patches(p, r, m)
     first = m.constraint.shape[0] - m.bounds.shape[1]
     for i in range(m.bounds.shape[1]):
         _constrain(m, first + i, m.a_map[nv - nu + i], 1.0, m.bounds[0, i], m.bounds[1, i])
     if not cholesky(m.factor, nu):
         return SINGULAR
-    return _substitute(m, row)
+    return _substitute(m)
 
 
 @compiled
-def _add_tasks(m: Matrices, tasks: Array, row: Array) -> None:
-    """Add the costs of the tasks' rows; ``row`` (nu + 1,) is overwritten, as in what follows."""
-    nv = m.a_map.shape[0]
+def _add_tasks(m: Matrices, tasks: Array) -> None:
+    """Add the costs of the tasks' rows."""
+    nv, row = m.a_map.shape[0], m.row
     for t in range(tasks.shape[0]):
         if tasks[t, nv + WEIGHT] == 0.0:
             continue
@@ -183,9 +183,9 @@ def _add_tasks(m: Matrices, tasks: Array, row: Array) -> None:
 
 
 @compiled
-def _add_contacts(p: Any, weight: float, m: Matrices, directions: int, row: Array) -> None:
+def _add_contacts(p: Any, weight: float, m: Matrices, directions: int) -> None:
     """Add the costs of the contacts' forces, the cones of points, and the normal forces' ranges."""
-    up, rows = min(directions, UP + 1) - 1, rows_per_contact(directions)
+    up, rows, row = min(directions, UP + 1) - 1, rows_per_contact(directions), m.row
     for i in range(p.contacts):
         force, top = m.f_map[directions * i :], m.torque_limit.shape[0] + rows * i
         for d in range(up + 1):
@@ -202,9 +202,9 @@ def _add_contacts(p: Any, weight: float, m: Matrices, directions: int, row: Arra
 
 
 @compiled
-def _add_patches(p: Any, r: Any, m: Matrices, row: Array) -> None:
+def _add_patches(p: Any, r: Any, m: Matrices) -> None:
     """Add the costs of the soles' moments about their toes, and the cones of those that stand."""
-    nu, weight = m.torque_limit.shape[0], r.mass * r.gravity
+    nu, weight, row = m.torque_limit.shape[0], r.mass * r.gravity, m.row
     wrench, cone, half = np.empty((PATCH, nu + 1)), np.empty((CONE, PATCH)), np.empty(2)
     for i in range(p.contacts):
         patch, top = p.contact[i], nu + (CONE + 1) * i
@@ -248,9 +248,9 @@ def _constrain(m: Matrices, at: int, row: Array, unit: float, low: float, high: 
 
 
 @compiled
-def _substitute(m: Matrices, row: Array) -> int:
+def _substitute(m: Matrices) -> int:
     """Take the QP from z to w, with the factor of H, but for constraints where none acts."""
-    nu = m.torque_limit.shape[0]
+    nu, row = m.torque_limit.shape[0], m.row
     _forward(m.factor, m.gradient)
     for i in range(nu):  # Numba compiles the copy of a whole array for seconds
         m.minimum[i] = row[i] = -m.gradient[i]
@@ -302,8 +302,8 @@ def _backward(factor: Array, vector: Array) -> None:
 
 
 @compiled
-def torques(m: Matrices, w: Array, out: Array) -> None:
-    """Write the joint torques of the QP's solution, tau_max * (L^-T w), into ``out`` (nu,) [N m].
+def torques(m: Matrices, w: Array) -> None:
+    """Write the model's joint torques of the QP's solution, tau_max * (L^-T w).
 
     They are rounded to 2^-24 of tau_max, which is near ProxQP's tolerance. Where a process has
     loaded another build of ProxQP than :func:`.solver.load_proxqp` does, the last digits of the
@@ -311,12 +311,12 @@ def torques(m: Matrices, w: Array, out: Array) -> None:
     walk would not be the same twice.
     """
     for i in range(w.shape[0]):
-        out[i] = w[i]
-    _backward(m.factor, out)
+        m.torque[i] = w[i]
+    _backward(m.factor, m.torque)
     for i in range(w.shape[0]):
         # The solver's tolerance may leave a torque a hair beyond its limit.
-        share = np.round(min(1.0, max(-1.0, out[i])) * _GRID) / _GRID
-        out[i] = share * m.torque_limit[i]
+        share = np.round(min(1.0, max(-1.0, m.torque[i])) * _GRID) / _GRID
+        m.torque[i] = share * m.torque_limit[i]
 
 
 @compiled
@@ -342,16 +342,16 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 
 
 @compiled
-def answer(load: float, m: Matrices, model: Array, found: tuple[Array, Array, Array]) -> None:
+def answer(load: float, m: Matrices, found: tuple[Array, Array, Array]) -> None:
     """Write a tick's answer into ``found``: torques, forces of the contacts, accelerations.
 
-    ``model`` are the joint torques (nu,) of the model [N m], ``load`` the robot's inertia over its.
+    ``load`` is the robot's inertia over the model's.
     """
     torque, force, acceleration = found
-    _affine(m.a_map, model, acceleration)
-    _affine(m.f_map, model, force)
+    _affine(m.a_map, m.torque, acceleration)
+    _affine(m.f_map, m.torque, force)
     for i in range(torque.shape[0]):
-        torque[i] = load * model[i]
+        torque[i] = load * m.torque[i]
 
 
 @compiled
@@ -368,20 +368,19 @@ def solve_free(
     data: Any,
     arrays: tuple[Any, ...],
     tasks: Array,
-    room: tuple[Matrices, Array],
+    m: Matrices,
     found: tuple[Array, Array, Array],
 ) -> int:
     """Solve a tick in which no limit acts: ``FREE`` where none does.
 
     Else what :func:`assemble` finds, or ``BRAKED`` where accelerations are to be bounded and
-    nothing has been assembled yet. ``room`` is from :meth:`.solver.WholeBodyQp.room`, ``found`` as
-    for :func:`answer`.
+    nothing has been assembled yet. ``m`` is from :meth:`.solver.WholeBodyQp.room`, ``found`` as for
+    :func:`answer`.
     """
     if bounds_needed(qp[0], data[0]):
         return BRAKED
-    m, model = room
     kind = assemble(qp, data, arrays, tasks, m)
     if kind == FREE:
-        torques(m, m.minimum, model)
-        answer(qp[0].load, m, model, found)
+        torques(m, m.minimum)
+        answer(qp[0].load, m, found)
     return kind

@@ -180,16 +180,18 @@ def bound_joints(robot: Robot, options: QpOptions, bounds: Array, slack: float) 
 class Workspace:
     """Matrices and ProxQP object for so many contacts, and ``bounded`` accelerations of joints.
 
-    ``limit`` (nu,) are the model's limits of torque [N m], which the matrices share.
+    ``shared`` are the model's limits of torque, and its torques (nu,) [N m], for all matrices.
     """
 
-    def __init__(self, robot: Robot, limit: Array, contacts: int, bounded: int = 0) -> None:
-        nu, forces = len(limit), robot.contact_rows * contacts
+    def __init__(
+        self, robot: Robot, shared: tuple[Array, Array], contacts: int, bounded: int
+    ) -> None:
+        nu, forces = len(shared[0]), robot.contact_rows * contacts
         rows = nu + problem.rows_per_contact(robot.contact_rows) * contacts + bounded
         maps = (robot.nv, nu + 1), (forces, nu + 1)
         quadratic = (nu, nu), (nu,), (rows, nu), (rows,), (rows,), (nu,)
         shapes = (2, bounded), *maps, *quadratic, (forces, robot.nv), (forces,), (nu + 1,)
-        self.matrices = problem.Matrices(limit, *(np.zeros(shape) for shape in shapes))
+        self.matrices = problem.Matrices(*shared, *(np.zeros(shape) for shape in shapes))
         self._proxqp = load_proxqp()
         self._warm: Any = None  # or a QP that has solved the problem of an earlier tick
 
@@ -250,12 +252,11 @@ class WholeBodyQp:
         now["stop_time"], now["load"] = o.stop_horizon / o.speed_share, 1.0
         self._options = o
         nu, most = len(robot.torque_limit), int(robot.data["contacts"][0])
-        self._limit, self._torque = np.zeros(nu), np.zeros(nu)  # of the model
+        self._limit, self._torque = of_model = np.zeros(nu), np.zeros(nu)
         self.workspaces, self._braked = (
-            [Workspace(robot, self._limit, contacts, bounded) for contacts in range(most + 1)]
+            [Workspace(robot, of_model, contacts, bounded) for contacts in range(most + 1)]
             for bounded in (0, nu)
         )
-        self._rooms = [(workspace.matrices, self._torque) for workspace in self.workspaces]
         self._contacts, self._sizes = self.data["contacts"], (nu, robot.nv, robot.contact_rows)
         self._load = 1.0
         self.torque_limit = robot.torque_limit * o.torque_scale
@@ -288,18 +289,18 @@ class WholeBodyQp:
         now["contacts"], now["contact"][:count] = count, stance.contacts
         now["cap"][:count], directions = stance.cap, self.robot.contact_rows
         now["force"][:count, :directions] = stance.force.reshape(count, directions)
-        robot, room, found = self.robot, self.room(load), self.answer_arrays()
-        kind = problem.solve_free(self.data, robot.data, robot.arrays, tasks.table, room, found)
+        robot, m, found = self.robot, self.room(load), self.answer_arrays()
+        kind = problem.solve_free(self.data, robot.data, robot.arrays, tasks.table, m, found)
         return self.finish(kind, tasks, found)
 
-    def room(self, load: float) -> tuple[problem.Matrices, Array]:
-        """Arrays for :func:`.problem.solve_free` of the stance in ``data``, the same for the same.
+    def room(self, load: float) -> problem.Matrices:
+        """Those for :func:`.problem.solve_free` of the stance in ``data``, the same for the same.
 
         ``load`` is as for :meth:`solve`.
         """
         if load != self._load:
             self._take_load(load)
-        return self._rooms[self._contacts[0]]
+        return self.workspaces[self._contacts[0]].matrices
 
     def answer_arrays(self) -> tuple[Array, Array, Array]:
         """New arrays for the answer of :func:`.problem.solve_free`, of the stance in ``data``."""
@@ -354,7 +355,7 @@ class WholeBodyQp:
                 best = None if kind == problem.SINGULAR else w.solve()
                 seconds += time.perf_counter() - start
             if best is not None:
-                problem.torques(w.matrices, best, self._torque)
+                problem.torques(w.matrices, best)
                 break
         else:
             if not self._failing:
@@ -366,5 +367,5 @@ class WholeBodyQp:
                     "is singular" if kind == problem.SINGULAR else regular,
                 )
             np.clip(self._torque, -self._limit, self._limit, out=self._torque)
-        problem.answer(self._load, w.matrices, self._torque, found)
+        problem.answer(self._load, w.matrices, found)
         return seconds, best is not None

@@ -30,6 +30,8 @@ from template_control.whole_body.task import References, Rows
 from template_control.whole_body.task_rows import TASK, write_rows
 
 _NO_GAINS = ("leg", "contact", "weight")
+_Two = tuple[NotNegative, NotNegative]
+_Three = tuple[NotNegative, NotNegative, NotNegative]
 
 
 class CompiledTask(Checked):
@@ -132,8 +134,8 @@ class ComTask(CompiledTask):
         falling: share of a pendulum's acceleration that an error of x is left.
     """
 
-    weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
-    gains: tuple[NotNegative, NotNegative] = tuned((60.0, 16.0), RATE_SQUARED, RATE)
+    weight: _Two = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
+    gains: _Two = tuned((60.0, 16.0), RATE_SQUARED, RATE)
     on_point: bool = tuned(False)
     falling: Share = tuned(0.0)
 
@@ -163,9 +165,9 @@ class FootTask(CompiledTask):
     leg: Leg = Leg.FRONT
     _: KW_ONLY
     contact: Index = tuned(0)
-    weight: tuple[NotNegative, NotNegative] = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
-    gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
-    hold_gains: tuple[NotNegative, NotNegative] = tuned((1e4, 200.0), RATE_SQUARED, RATE)
+    weight: _Two = tuned((1.0, 1.0), PER_ACCELERATION_SQUARED)
+    gains: _Two = tuned((600.0, 45.0), RATE_SQUARED, RATE)
+    hold_gains: _Two = tuned((1e4, 200.0), RATE_SQUARED, RATE)
 
     kind = task_rows.FOOT
 
@@ -206,7 +208,7 @@ class PostureTask(CompiledTask):
     """
 
     weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)
-    gains: tuple[NotNegative, NotNegative] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
+    gains: _Two = tuned((100.0, 20.0), RATE_SQUARED, RATE)
 
     kind = task_rows.POSTURE
 
@@ -228,11 +230,9 @@ class OrientationTask(CompiledTask):
         yaw_gains: of yaw.
     """
 
-    weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
-        (1.0, 1.0, 0.02), PER_RATE_TO_THE_FOURTH
-    )
-    gains: tuple[NotNegative, NotNegative] = tuned((100.0, 20.0), RATE_SQUARED, RATE)
-    yaw_gains: tuple[NotNegative, NotNegative] = tuned((36.0, 12.0), RATE_SQUARED, RATE)
+    weight: _Three = tuned((1.0, 1.0, 0.02), PER_RATE_TO_THE_FOURTH)
+    gains: _Two = tuned((100.0, 20.0), RATE_SQUARED, RATE)
+    yaw_gains: _Two = tuned((36.0, 12.0), RATE_SQUARED, RATE)
 
     kind = task_rows.ORIENTATION
     in_space = True
@@ -256,11 +256,9 @@ class SpinTask(CompiledTask):
         turning: w, angular momentum over m h^2 for each radian of error [1/s].
     """
 
-    weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
-        (130.0, 130.0, 400.0), PER_RATE_TO_THE_FOURTH
-    )
+    weight: _Three = tuned((130.0, 130.0, 400.0), PER_RATE_TO_THE_FOURTH)
     bandwidth: NotNegative = tuned(60.0, RATE)
-    turning: tuple[NotNegative, NotNegative, NotNegative] = tuned((0.26, 0.26, 0.2), RATE)
+    turning: _Three = tuned((0.26, 0.26, 0.2), RATE)
 
     kind = task_rows.SPIN
     in_space = True
@@ -272,18 +270,14 @@ class SideFootTask(CompiledTask):
 
         J a + dJ/dt v = r'' + kp (r - p) + kd (r' - p')
 
-    Attributes:
-        leg: the foot's role.
-        contact: which one of the foot's contacts.
-        weight: [s^4/m^2].
-        gains: kp [1/s^2] and kd [1/s].
+    As :class:`FootTask`, but for the feedback that holds the foot back.
     """
 
     leg: Leg = Leg.FRONT
     _: KW_ONLY
     contact: Index = tuned(0)
     weight: NotNegative = tuned(1.0, PER_ACCELERATION_SQUARED)
-    gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
+    gains: _Two = tuned((600.0, 45.0), RATE_SQUARED, RATE)
 
     kind = task_rows.SIDE_FOOT
     in_space = True
@@ -303,7 +297,7 @@ class SpareJointTask(CompiledTask):
     """
 
     weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)
-    gains: tuple[NotNegative, NotNegative] = tuned((400.0, 40.0), RATE_SQUARED, RATE)
+    gains: _Two = tuned((400.0, 40.0), RATE_SQUARED, RATE)
 
     kind = task_rows.SPARE
     in_space = True
@@ -331,10 +325,8 @@ class SoleTask(CompiledTask):
 
     leg: Leg = Leg.FRONT
     _: KW_ONLY
-    weight: tuple[NotNegative, NotNegative, NotNegative] = tuned(
-        (0.05, 0.05, 0.05), PER_RATE_TO_THE_FOURTH
-    )
-    gains: tuple[NotNegative, NotNegative] = tuned((600.0, 45.0), RATE_SQUARED, RATE)
+    weight: _Three = tuned((0.05, 0.05, 0.05), PER_RATE_TO_THE_FOURTH)
+    gains: _Two = tuned((600.0, 45.0), RATE_SQUARED, RATE)
 
     kind = task_rows.SOLE
     in_space = True
@@ -375,12 +367,7 @@ class FrameTask:
     """
 
     @checked
-    def __init__(
-        self,
-        frame: str,
-        weight: NotNegative = 1.0,
-        gains: tuple[NotNegative, NotNegative] = _GAINS,
-    ) -> None:
+    def __init__(self, frame: str, weight: NotNegative = 1.0, gains: _Two = _GAINS) -> None:
         self.frame, self.gains, self.weights = frame, gains, (weight,) * 3
         self._target: Array | None = None
 
@@ -418,12 +405,7 @@ class JointTask:
     """
 
     @checked
-    def __init__(
-        self,
-        target: Vector,
-        weight: NotNegative = 1.0,
-        gains: tuple[NotNegative, NotNegative] = _GAINS,
-    ) -> None:
+    def __init__(self, target: Vector, weight: NotNegative = 1.0, gains: _Two = _GAINS) -> None:
         self.gains, self.weights = gains, (weight,) * len(target)
         self.set_target(target)
 
