@@ -214,8 +214,7 @@ class EmbeddingController:
         self.frame.reset()
         self.courses.clear()
         if self.lateral is not None:
-            others = (other.gait for other in self.supervisor.planners.values())
-            gaits = planner.gait, *others
+            gaits = (each.gait for each in (planner, *self.supervisor.planners.values()))
             self.lateral.begin(gaits, self.course(0.0), in_flight=not node.stance)
         self._enter(node.name)
         self.feet.begin(rear)
@@ -261,9 +260,7 @@ class EmbeddingController:
         """
         self.robot.update(*self.frame.enter(q, v))
         felt = NO_FORCE if force is None or self.lateral is not None else force
-        if not self.frame.of_world:
-            felt = self.frame.inward(felt)
-        found = sense(self._sensed, contact, felt, dt)
+        found = sense(self._sensed, contact, self.frame.inward(felt), dt)
         if found == DIVERGED:
             raise self.observer.diverged()
         if found != QUIET or self._slope_unknown:

@@ -50,6 +50,9 @@ PATH = structure(
 )
 """The path that the supervisor has planned, and the robot's place on it."""
 
+PlainCurve = tuple[Array, Array, Array]
+"""A :class:`~template_control.slip.path.Curve`, as compiled functions take it."""
+
 KEPT = 0
 """Result of :func:`plan_is_due` where the path is kept; else the value of a cause."""
 _OVERDUE, _STRAYED = int(Cause.OVERDUE.value), int(Cause.DEVIATION.value)
@@ -57,9 +60,7 @@ _LEADS_NOWHERE = int(Cause.NO_FUTURE.value)
 
 
 @compiled
-def move_clock(
-    path: Any, curve: tuple[Array, Array, Array], s: Any, mode: Any, want: Any, motion: Array
-) -> None:
+def move_clock(path: Any, curve: PlainCurve, s: Any, mode: Any, want: Any, motion: Array) -> None:
     """Go on along ``path``, of ``PATH``, to where the robot is now, and write the CoM's reference.
 
     ``s`` is of ``SENSED``, ``mode`` of ``MODE``, ``want`` of ``REFERENCES``; ``motion`` is dx/dt of

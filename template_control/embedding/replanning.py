@@ -197,19 +197,23 @@ def choose_all_controls(
     return decision
 
 
-def choose_stiffnesses(rollout: TemplateRollout, s: Situation) -> Decision | None:
+def choose_rest(rollout: TemplateRollout, s: Situation) -> Decision | None:
     """Let the planner choose the stiffnesses on which the rest of the stride depends.
 
-    None of a planner of whole strides.
+    In a stride that is broken into, the angle too, until a leg lands. None of a planner of whole
+    strides.
     """
-    free = free_controls(rollout.automaton, s.node)
+    free, turn = free_controls(rollout.automaton, s.node), 0.0
+    if s.cause is Cause.RECOVERY and s.node.edge(Event.TOUCHDOWN) is not None:
+        free = [int(Slot.TOUCHDOWN_ANGLE), *free]
+        turn = reachable_turn(rollout.scale, s.to_go)
     ahead = rollout.ahead(s.node, s.sensed)
-    context = RestContext(ahead, s.decision, s.goal.target, free, cause=s.cause)
+    context = RestContext(ahead, s.decision, s.goal.target, free, turn, s.cause)
     return rest_decided(rollout.planners.of(s.goal), context)
 
 
 def _after_touchdown(rollout: TemplateRollout, s: Situation) -> Decision | None:
-    decision = choose_stiffnesses(rollout, s)
+    decision = choose_rest(rollout, s)
     if decision is not None:
         return decision
     p = rollout.planners.route.parameters
@@ -235,7 +239,7 @@ def _after_deviation(rollout: TemplateRollout, s: Situation) -> Decision | None:
     decision = None
     if s.whole:
         decision = choose_all_controls(rollout, s, reachable_angles(rollout, s))
-    return decision or choose_stiffnesses(rollout, s)
+    return decision or choose_rest(rollout, s)
 
 
 class Rule(NamedTuple):
@@ -341,19 +345,13 @@ def _goes_on(rollout: TemplateRollout, s: Situation) -> bool:
 
 def _break_into(rollout: TemplateRollout, s: Situation) -> Decision | None:
     """Decision of another stride, that of the one which is left so far; None: there is none."""
-    planner = rollout.planners.of(s.goal)
-    if s.node.name in rollout.curved:
-        wanted = section_of(rollout.automaton.sections(s.node.name)[1]).padded(s.goal.target)
-        u = np.zeros(NUM_SLOTS)
-        begun = replace(s.decision, predicted=wanted, nominal=False, controls=u)
-        decision, stride = rollout.curve(s.node.name, s.sensed, s.sensed.state, planner, begun)
-        return replace(decision, feasible=decision.feasible and stride.completed, lasting=True)
-    slots = free_controls(rollout.automaton, s.node)
-    if s.node.edge(Event.TOUCHDOWN) is not None:
-        slots = [int(Slot.TOUCHDOWN_ANGLE), *slots]
-    ahead, turn = rollout.ahead(s.node, s.sensed), reachable_turn(rollout.scale, s.to_go)
-    context = RestContext(ahead, s.decision, s.goal.target, slots, turn, s.cause)
-    return rest_decided(planner, context)
+    planner, name = rollout.planners.of(s.goal), s.node.name
+    if name not in rollout.curved:
+        return choose_rest(rollout, s)
+    wanted = section_of(rollout.automaton.sections(name)[1]).padded(s.goal.target)
+    begun = replace(s.decision, predicted=wanted, nominal=False, controls=np.zeros(NUM_SLOTS))
+    decision, stride = rollout.curve(name, s.sensed, s.sensed.state, planner, begun)
+    return replace(decision, feasible=decision.feasible and stride.completed, lasting=True)
 
 
 def curve_or_step(

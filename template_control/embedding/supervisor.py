@@ -29,7 +29,7 @@ from template_control.embedding.replanning import (
     RULES,
     Situation,
     choose_assist,
-    choose_stiffnesses,
+    choose_rest,
     curve_or_step,
     find_recovery,
 )
@@ -244,7 +244,7 @@ class StrideSupervisor:
                 return other
             # A stride on the springs keeps what was chosen as the robot broke into it.
             if self._along_curve:
-                self.decision = choose_stiffnesses(self._rollout, s) or self.decision
+                self.decision = choose_rest(self._rollout, s) or self.decision
             return self.follow(node, sensed, now)
         decision = rule.choose(self._rollout, s)
         self.decision = decision or self.decision

@@ -24,7 +24,7 @@ from template_control.embedding.free.sway import closing_foothold, side_speed, s
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
 from template_control.embedding.lean import LEAN, advance_lean
 from template_control.embedding.modes import GUARDS, MODE, first_fired
-from template_control.embedding.planned_path import KEPT, PATH, move_clock, plan_is_due
+from template_control.embedding.planned_path import KEPT, PATH, PlainCurve, move_clock, plan_is_due
 from template_control.embedding.state import SENSED, read_state, rolled
 from template_control.embedding.swing import (
     FEET,
@@ -45,7 +45,7 @@ from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.dynamics.model import ORDER
 from template_control.structured import keep, structure
 from template_control.warm_up import Part
-from template_control.whole_body.problem import solve_free
+from template_control.whole_body.problem import Answer, solve_free
 from template_control.whole_body.solver import WholeBodyQp
 from template_control.whole_body.stack import TaskStack
 from template_control.whole_body.task import References
@@ -215,14 +215,14 @@ def advance(kept: Any, dt: float) -> None:
 
 
 @compiled_into
-def solve(kept: Any, found: tuple[Array, Array, Array]) -> int:
+def solve(kept: Any, found: Answer) -> int:
     """Solve the QP of the rows as they are, as :func:`.solve_free` returns it."""
     (_, data, _, qp, arrays), _, (_, table), room = kept.value
     return solve_free(qp, data, arrays, table, room, found)
 
 
 @compiled
-def act(kept: Any, found: tuple[Array, Array, Array], dt: float) -> int:
+def act(kept: Any, found: Answer, dt: float) -> int:
     """As :func:`advance`, then as :func:`solve`."""
     advance(kept, dt)
     return solve(kept, found)
@@ -265,12 +265,7 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
 
 @compiled
 def _move_in_space(
-    t: Any,
-    r: Any,
-    want: Any,
-    curve: tuple[Array, Array, Array],
-    lateral: tuple[Any, ...] | None,
-    dt: float,
+    t: Any, r: Any, want: Any, curve: PlainCurve, lateral: tuple[Any, ...] | None, dt: float
 ) -> None:
     """Move on what only a floating-base robot has; of a planar one, whose ``lateral`` is None, not.
 

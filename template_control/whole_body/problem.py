@@ -106,6 +106,10 @@ def patch_cone(friction: float, half: Array, centre: Array, out: Array) -> None:
         out[row, 1] -= centre[0] * out[row, 5]
 
 
+Answer = tuple[Array, Array, Array]
+"""Torques, forces of the contacts on the ground, accelerations: as of :class:`.solver.Solution`."""
+
+
 class Matrices(NamedTuple):
     """The QP in w, and how it is mapped back; :func:`assemble` overwrites all from ``a_map`` on.
 
@@ -179,7 +183,7 @@ def _add_tasks(m: Matrices, tasks: Array) -> None:
                 for j in range(row.shape[0]):
                     row[j] += tasks[t, k] * m.a_map[k, j]
         row[-1] += tasks[t, nv + BIAS] - tasks[t, nv + DESIRED]
-        _add_square(m, row, tasks[t, nv + WEIGHT])
+        _add_square(m, tasks[t, nv + WEIGHT])
 
 
 @compiled
@@ -192,7 +196,7 @@ def _add_contacts(p: Any, weight: float, m: Matrices, directions: int) -> None:
             for j in range(row.shape[0]):
                 row[j] = force[d, j] / weight
             row[-1] -= p.force[i, d] / weight
-            _add_square(m, row, p.force_cost)
+            _add_square(m, p.force_cost)
         for side in range(2 * up if directions < PATCH else 0):
             sign = 1.0 - 2.0 * (side % 2)
             for j in range(row.shape[0]):
@@ -213,7 +217,7 @@ def _add_patches(p: Any, r: Any, m: Matrices) -> None:
             side = r.sole_half[patch, 1 if axis == 0 else 0]
             for j in range(nu + 1):
                 row[j] = wrench[3 + axis, j] / (weight * side)
-            _add_square(m, row, p.force_cost if axis == UP else _CROOKED * p.force_cost)
+            _add_square(m, p.force_cost if axis == UP else _CROOKED * p.force_cost)
         for k in range(2):
             half[k] = p.sole_share * r.sole_half[patch, k]
         patch_cone(p.friction, half, r.sole_centre[patch], cone)
@@ -320,9 +324,9 @@ def torques(m: Matrices, w: Array) -> None:
 
 
 @compiled
-def _add_square(m: Matrices, row: Array, weight: float) -> None:
+def _add_square(m: Matrices, weight: float) -> None:
     """Add the square of (row[:-1] tau + row[-1]), tau = tau_max z, to H's lower triangle and g."""
-    nu, scale = m.gradient.shape[0], m.torque_limit
+    nu, scale, row = m.gradient.shape[0], m.torque_limit, m.row
     for i in range(nu):
         left = weight * row[i] * scale[i]
         m.gradient[i] += left * row[nu]
@@ -342,11 +346,8 @@ def _affine(matrix: Array, tau: Array, out: Array) -> None:
 
 
 @compiled
-def answer(load: float, m: Matrices, found: tuple[Array, Array, Array]) -> None:
-    """Write a tick's answer into ``found``: torques, forces of the contacts, accelerations.
-
-    ``load`` is the robot's inertia over the model's.
-    """
+def answer(load: float, m: Matrices, found: Answer) -> None:
+    """Write a tick's answer into ``found``; ``load`` is the robot's inertia over the model's."""
     torque, force, acceleration = found
     _affine(m.a_map, m.torque, acceleration)
     _affine(m.f_map, m.torque, force)
@@ -364,12 +365,7 @@ def bounds_needed(p: Any, r: Any) -> bool:
 
 @compiled_into
 def solve_free(
-    qp: Any,
-    data: Any,
-    arrays: tuple[Any, ...],
-    tasks: Array,
-    m: Matrices,
-    found: tuple[Array, Array, Array],
+    qp: Any, data: Any, arrays: tuple[Any, ...], tasks: Array, m: Matrices, found: Answer
 ) -> int:
     """Solve a tick in which no limit acts: ``FREE`` where none does.
 

@@ -302,12 +302,12 @@ class WholeBodyQp:
             self._take_load(load)
         return self.workspaces[self._contacts[0]].matrices
 
-    def answer_arrays(self) -> tuple[Array, Array, Array]:
+    def answer_arrays(self) -> problem.Answer:
         """New arrays for the answer of :func:`.problem.solve_free`, of the stance in ``data``."""
         (nu, nv, rows), empty = self._sizes, np.empty
         return empty(nu), empty(rows * int(self._contacts[0])), empty(nv)
 
-    def finish(self, kind: int, tasks: TaskStack, found: tuple[Array, Array, Array]) -> Solution:
+    def finish(self, kind: int, tasks: TaskStack, found: problem.Answer) -> Solution:
         """The answer of a tick, by ProxQP where limits act.
 
         Args:
@@ -334,7 +334,7 @@ class WholeBodyQp:
         self.data["load"] = load
 
     def _solve_limited(
-        self, kind: int, tasks: TaskStack, found: tuple[Array, Array, Array]
+        self, kind: int, tasks: TaskStack, found: problem.Answer
     ) -> tuple[float, bool]:
         """Fill ``found`` where limits act; seconds in ProxQP, and whether it is solved."""
         robot, braked, seconds = self.robot, kind == problem.BRAKED, 0.0

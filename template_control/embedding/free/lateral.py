@@ -187,6 +187,7 @@ class LateralPlanner:
         self.lessons: dict[str, LateralLearnt] = {}
         self.cycle: LateralCycle
         self._gait: Gait | None = None
+        self._kind = ""
         self._lateral: LateralGait
         self._aim = _NO_AIM
         self._stretch = 1.0
@@ -200,10 +201,6 @@ class LateralPlanner:
     def learnt(self) -> LateralLearnt:
         """What has been learnt of the present gait's strides."""
         return self.lessons.get(self._kind, LateralLearnt())
-
-    @property
-    def _kind(self) -> str:
-        return "" if self._gait is None else self._gait.stride
 
     @property
     def placed(self) -> Placement | None:
@@ -227,7 +224,7 @@ class LateralPlanner:
         None: of the gait so far, if there is one.
         """
         if gait is not None and gait is not self._gait:
-            self._gait = gait
+            self._gait, self._kind = gait, gait.stride
             self._lateral = lateral_gait(gait, self._unscaled, ratio=self._ratio)
         if self._gait is not None:
             self.cycle = lateral_cycle(self._lateral, self.wish, self.learnt.offset)

@@ -138,8 +138,7 @@ class LateralMotion:
         self._width = self.planner.wish.width
         self.robot.facing, self._turns = 0.0, 0.0
         self.planner.reset(next(filter(_steps, gaits), None))
-        for foot in range(2):
-            self._stands(foot)
+        self._stood[:] = self.robot.space.foot_position[:, :2]
 
     def state(self, height: float, momentum_speed: bool) -> Array:
         """(2,) y of the CoM at a height [m], and dy/dt, with the momentum if the phase has it."""
@@ -197,10 +196,6 @@ class LateralMotion:
         """
         side = SIDES[foot]
         return side if self.robot.paired or onward(self.robot.facing) > 0.0 else side.other
-
-    def _stands(self, foot: int) -> None:
-        """A foot stands where it is now."""
-        self._stood[foot] = self.robot.space.foot_position[foot, :2]
 
     def end_stride(self, course: Course, com: Array, nominal: bool, section: Section) -> bool:
         """Learn from a stride that has ended, and turn the heading frame; whether that has turned.
@@ -339,7 +334,7 @@ class LateralMotion:
         """A foot has landed, ``lasted`` [s] after the section."""
         self.planner.touch_down(lasted)
         self.planner.data["catches"] = 0
-        self._stands(foot)
+        self._stood[foot] = self.robot.space.foot_position[foot, :2]
         self.planner.aim(self._side(foot))
 
     def lift(self, foot: int) -> None:

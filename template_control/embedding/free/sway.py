@@ -15,6 +15,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.compiled import compiled
+from template_control.embedding.planned_path import PlainCurve
 from template_control.robot.terms import onward
 from template_control.slip.automaton.vocabulary import Event
 from template_control.slip.path import sample
@@ -63,7 +64,7 @@ _REST_IN = 0.5  # time in which the CoM comes to rest over both feet, at the soo
 
 
 @compiled
-def sway(t: Any, r: Any, want: Any, curve: tuple[Array, Array, Array]) -> None:
+def sway(t: Any, r: Any, want: Any, curve: PlainCurve) -> None:
     """Write how a robot on soles, or on pairs of feet, is to sway.
 
     Along a planner's curve the centre of pressure is planned:
@@ -311,7 +312,7 @@ def front_shares(along: float, apart: float, half: float) -> tuple[float, float]
 
 @compiled
 def _shares_of_lifting(
-    t: Any, r: Any, curve: tuple[Array, Array, Array], stays: int, after: float
+    t: Any, r: Any, curve: PlainCurve, stays: int, after: float
 ) -> tuple[float, float]:
     """Least and largest share that the foot which lifts off can bear, ``after`` some time [s].
 
@@ -330,7 +331,7 @@ def _shares_of_lifting(
 
 
 @compiled
-def _planned(t: Any, r: Any, curve: tuple[Array, Array, Array]) -> float:
+def _planned(t: Any, r: Any, curve: PlainCurve) -> float:
     """y of the first centre of pressure [m] of the plan to the end of the stride.
 
     Both feet stand until a liftoff, if there is one; then one does, until the touchdown or the
