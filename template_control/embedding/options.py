@@ -112,25 +112,18 @@ class EmbeddingOptions(Checked):
         """
         table = dict(self.phases or KINDS[self.kind].phases)
         for name, numbers in self.tasks.items():
-            where, _, wanted = name.rpartition(".")
+            place, (where, _, wanted) = f"{type(self).__name__}.tasks.{name}", name.rpartition(".")
             met = False
             for key, control in table.items():
-                node = key.name if isinstance(key, Phase) else key
-                if where not in ("", node, node.partition("_")[0]):
-                    continue
-                tasks = tuple(
-                    _with_numbers(task, numbers, f"{type(self).__name__}.tasks.{name}")
-                    if task_name(task) == wanted
-                    else task
-                    for task in control.tasks
-                )
-                met |= wanted in map(task_name, control.tasks)
-                table[key] = replace(control, tasks=tasks)
+                node, tasks = key.name if isinstance(key, Phase) else key, list(control.tasks)
+                for i, task in enumerate(tasks):
+                    if where in ("", node, node.partition("_")[0]) and task_name(task) == wanted:
+                        tasks[i], met = _with_numbers(task, numbers, place), True
+                table[key] = replace(control, tasks=tuple(tasks))
             if not met:
                 known = sorted({task_name(t) for control in table.values() for t in control.tasks})
                 raise ParameterError(
-                    f"{type(self).__name__}.tasks.{name} is no task of a phase: give one of"
-                    f" {', '.join(known)}, or PHASE.TASK"
+                    f"{place} is no task of a phase: give one of {', '.join(known)}, or PHASE.TASK"
                 )
         return table
 

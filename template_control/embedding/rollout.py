@@ -173,7 +173,6 @@ class RoutePlanners:
         if instead is not None:
             goal, planner = instead, self.of(instead)
             decision, start = self.plan(section, question, goal)
-        seconds = time.perf_counter() - begin
         report = SectionReport(
             time=now,
             section=section,
@@ -183,7 +182,7 @@ class RoutePlanners:
             decision=decision,
             offset=check(f"{type(planner).__name__}.offset", planner.offset, Triple).copy(),
             estimators=estimators,
-            plan_seconds=seconds,
+            plan_seconds=time.perf_counter() - begin,
         )
         return report, start, wanted is not None
 
@@ -195,9 +194,8 @@ class RoutePlanners:
         if goal.then is None or goal.then == goal.stride or goal.then not in self.planners:
             return None
         begin, end = self._sections(goal.stride)
-        if begin is not end or self._sections(goal.then) != (begin, end):
-            return None
-        return replace(goal, stride=goal.then, then=None)
+        same = begin is end and self._sections(goal.then) == (begin, end)
+        return replace(goal, stride=goal.then, then=None) if same else None
 
     def padded_target(self, goal: StrideGoal) -> Array:
         """(3,) dx/dt, y, dy/dt where a goal leads to."""

@@ -119,7 +119,9 @@ class StateObserver:
     def begin(self, stands: bool) -> None:
         """Begin a run; where no foot stands, the ground is at height 0."""
         self.now.feet = self._feet.foot_of_leg
-        self.ground = self._height(self._feet.landed) if stands else 0.0
+        self.ground = 0.0
+        if stands:
+            self._rise(self._feet.landed)
 
     def read(self) -> None:
         """Read the state of this tick; a DivergedError if the speed is not finite."""
@@ -167,11 +169,8 @@ class StateObserver:
 
     def _rise(self, foot: int) -> float:
         """Put the ground under ``foot``; how much higher it is there [m]."""
-        before, self.ground = self.ground, self._height(foot)
+        before, self.ground = self.ground, float(self._robot.foot_position[foot, 1])
         return self.ground - before
-
-    def _height(self, foot: int) -> float:
-        return float(self._robot.foot_position[foot, 1])
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ import numpy as np
 
 from template_control.arrays import Array, BoolArray
 from template_control.compiled import compiled, compiled_into
+from template_control.embedding import swing
 from template_control.embedding.free.lateral import LATERAL, lateral_foothold
 from template_control.embedding.free.sway import closing_foothold, side_speed, sway
 from template_control.embedding.ground import FRAME, to_world, vector_to_world
@@ -26,17 +27,6 @@ from template_control.embedding.lean import LEAN, advance_lean
 from template_control.embedding.modes import GUARDS, MODE, first_fired
 from template_control.embedding.planned_path import KEPT, PATH, PlainCurve, move_clock, plan_is_due
 from template_control.embedding.state import SENSED, read_state, rolled
-from template_control.embedding.swing import (
-    FEET,
-    drop,
-    furthest,
-    level_reach,
-    meet_wall,
-    quintic_step,
-    spread_contacts,
-    swing_step,
-    wait,
-)
 from template_control.estimation.contacts import CONTACTS, DUE, IN_AIR, ON_GROUND, update_contacts
 from template_control.estimation.friction import SLIDES, feel_slides
 from template_control.robot.library import load_robot
@@ -66,7 +56,7 @@ TICK = structure(
     mode=MODE,
     contacts=CONTACTS,
     slides=SLIDES,
-    feet=FEET,
+    feet=swing.FEET,
     sensed=SENSED,
     guards=GUARDS,
     path=PATH,
@@ -242,9 +232,9 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
         if t.contacts.wall[foot] > 0.0:
             # The path goes on as if an overdue foot had time; it has none to go up again.
             aim = (foothold, 0.0 if foot == overdue else due)
-            meet_wall(f, foot, x, y, r.foot_position[foot], aim, dt)
+            swing.meet_wall(f, foot, x, y, r.foot_position[foot], aim, dt)
         elif foot == overdue:
-            drop(f, foot, x, y, dt)
+            swing.drop(f, foot, x, y, dt)
         else:
             foreseen = np.isfinite(foothold)
             if not foreseen:
@@ -254,13 +244,13 @@ def move_swings(t: Any, r: Any, want: Any, dt: float) -> None:
                 due = path.step_duration - f.swing_time[foot]
             if mode.rolling_contact:
                 foothold = rolled(foothold, path.touchdown_angle, r.foot_radius)
-            wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
-            swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), foreseen, dt)
+            swing.wait(f, foot, x, r.foot_position[foot, 0], r.foot_velocity[foot, 0])
+            swing.swing_step(f, foot, x, y, (foothold, t.sensed.ground, due), foreseen, dt)
         hip = (r.hips[0] + onward(r.facing) * r.toe_ahead, r.hips[UP] - r.ankle_height)
         sideways = 0.0
         if np.isfinite(r.leg_lean):
-            sideways = r.foot_position[foot, _SIDE] - level_reach(r, foot, y[0])[0]
-        want.furthest[foot] = furthest(f.leg_share[foot], hip, y[0], sideways, r.leg_length)
+            sideways = r.foot_position[foot, _SIDE] - swing.level_reach(r, foot, y[0])[0]
+        want.furthest[foot] = swing.furthest(f.leg_share[foot], hip, y[0], sideways, r.leg_length)
 
 
 @compiled
@@ -305,13 +295,13 @@ def _swing_sideways(t: Any, r: Any, want: Any, plan: tuple[Any, ...], dt: float)
         later = path.landing_time[foot] > first
         target = foothold + lateral.second_step if later else foothold
         if np.isfinite(r.leg_lean):
-            middle, reach = level_reach(r, foot, want.foot[foot, 1, 0])
+            middle, reach = swing.level_reach(r, foot, want.foot[foot, 1, 0])
             target = min(max(target, middle - reach), middle + reach)
         # Without a touchdown on the path there is no time in which to get there.
         if not f.horizon[foot] < due < np.inf or not np.isfinite(target):
             side[1] = side[2] = 0.0
         else:
-            quintic_step(side, target, 0.0, max(due - f.early[foot], f.horizon[foot]), dt)
+            swing.quintic_step(side, target, 0.0, max(due - f.early[foot], f.horizon[foot]), dt)
 
 
 @compiled
@@ -338,7 +328,9 @@ def _place_contacts(t: Any, r: Any, want: Any) -> None:
     for i in range(mode.swings):
         foot = f.roles[mode.swing_leg[i]]
         if r.members[foot] > 1:
-            spread_contacts(f, foot, r, r.facing + want.lean[2], t.path.step_duration, want.offset)
+            swing.spread_contacts(
+                f, foot, r, r.facing + want.lean[2], t.path.step_duration, want.offset
+            )
     for leg in range(mode.stances):
         foot = f.roles[leg]
         want.furthest[foot] = np.inf
