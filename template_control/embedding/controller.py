@@ -16,6 +16,7 @@ import numpy as np
 
 from template_control.arrays import Array, BoolArray
 from template_control.checks.checked import checked
+from template_control.embedding import tick
 from template_control.embedding.free.motion import Course, LateralMotion
 from template_control.embedding.ground import SlopeFrame
 from template_control.embedding.learners import Learners
@@ -26,20 +27,6 @@ from template_control.embedding.recovery import NEEDED, Recovery
 from template_control.embedding.state import SectionReport, Snapshot, StateObserver
 from template_control.embedding.supervisor import StrideSupervisor
 from template_control.embedding.swing import Feet, Swings
-from template_control.embedding.tick import (
-    CONTROL,
-    DIVERGED,
-    QUIET,
-    SNAPSHOT,
-    TICK,
-    act,
-    advance,
-    feel_friction,
-    look,
-    sense,
-    solve,
-    stand,
-)
 from template_control.errors import ParameterError
 from template_control.estimation.contacts import NO_FORCE, forget_contacts, set_contacts
 from template_control.estimation.slope import SlopeEstimate
@@ -101,7 +88,7 @@ class EmbeddingController:
         route: Route | None = None,
         automaton: Automaton = AUTOMATON,
     ) -> None:
-        ready(CONTROL)
+        ready(tick.CONTROL)
         if isinstance(planners, Planner):
             gait = planners.gait
             route = route or SteadyRoute.of(gait, automaton)
@@ -121,19 +108,19 @@ class EmbeddingController:
             )
         o = scaled(replace(given, phases=given.phase_table(), tasks={}), scale)
         self.robot, self.options, self.parameters = robot, o, route.parameters
-        self._tick = tick = np.zeros(1, TICK)
-        tick["friction_margin"] = o.qp.friction_margin
-        self.learners = Learners(o, self.parameters, robot, tick)
+        self._tick = now = np.zeros(1, tick.TICK)
+        now["friction_margin"] = o.qp.friction_margin
+        self.learners = Learners(o, self.parameters, robot, now)
         self.slope = SlopeEstimate(self.parameters.rest_length)
-        self.frame = SlopeFrame(robot, tick["frame"])
+        self.frame = SlopeFrame(robot, now["frame"])
         self.references = References(pitch=o.trunk_pitch)
         self.swings = Swings.of(robot, scale, o.swing)
-        self.feet = Feet(self.references.foot, tick["feet"])
+        self.feet = Feet(self.references.foot, now["feet"])
         weight = robot.mass * robot.gravity
-        set_contacts(tick["contacts"], o.contacts, weight, scale, robot.groups)
+        set_contacts(now["contacts"], o.contacts, weight, scale, robot.groups)
         wanted = self.references.com[4:]
-        self.observer = StateObserver(robot, self.feet, wanted, tick["sensed"], tick["mode"])
-        set_guards(tick["guards"], self.parameters, o.guards)
+        self.observer = StateObserver(robot, self.feet, wanted, now["sensed"], now["mode"])
+        set_guards(now["guards"], self.parameters, o.guards)
         check_legs(automaton, robot)
         self._modes = modes(automaton, robot.nv, o.phase_table())
         for mode in self._modes.values():
@@ -142,8 +129,8 @@ class EmbeddingController:
         recovers = o.catches and automaton is AUTOMATON and planners.keys() >= NEEDED
         recovery = Recovery(self.parameters) if recovers else None
         rules = o.replan, automaton, curved, recovery
-        self.supervisor = StrideSupervisor(route, planners, *rules, tick["path"])
-        tick["path"]["body"][0, 5] = robot.half_length
+        self.supervisor = StrideSupervisor(route, planners, *rules, now["path"])
+        now["path"]["body"][0, 5] = robot.half_length
         self._enter(next(iter(self._modes)))
         self._slope_unknown = False  # the ground under feet that both stand where a run begins
         self.qp = WholeBodyQp(robot, o.qp)
@@ -151,9 +138,9 @@ class EmbeddingController:
         self.courses: list[Course] = []
         self.lateral: LateralMotion | None = None
         if isinstance(robot, FloatingBaseBiped) and given.lateral is not None:
-            keeps = self.feet, self.references, tick["lateral"]
+            keeps = self.feet, self.references, now["lateral"]
             self.lateral = LateralMotion(robot, self.parameters, given.lateral, *keeps)
-        self.memory = tick, robot.data, self.references.data
+        self.memory = now, robot.data, self.references.data
         self._memory = *self.memory, self.qp.data
         self._sensed = keep(self._memory)
 
@@ -179,9 +166,9 @@ class EmbeddingController:
 
     def snapshot(self) -> Snapshot:
         """Node, phase, template and swing references of the last tick."""
-        seen = np.zeros(1, SNAPSHOT)
-        look(*self.memory, seen)
-        found = dict(zip(SNAPSHOT.names or (), seen[0].item(), strict=True))
+        seen = np.zeros(1, tick.SNAPSHOT)
+        tick.look(*self.memory, seen)
+        found = dict(zip(tick.SNAPSHOT.names or (), seen[0].item(), strict=True))
         return Snapshot(**{**found, "node": self.node.name})
 
     def first_pitch(self) -> float:
@@ -260,17 +247,17 @@ class EmbeddingController:
         """
         self.robot.update(*self.frame.enter(q, v))
         felt = NO_FORCE if force is None or self.lateral is not None else force
-        found = sense(self._sensed, contact, self.frame.inward(felt), dt)
-        if found == DIVERGED:
+        found = tick.sense(self._sensed, contact, self.frame.inward(felt), dt)
+        if found == tick.DIVERGED:
             raise self.observer.diverged()
-        if found != QUIET or self._slope_unknown:
+        if found != tick.QUIET or self._slope_unknown:
             self._decide_anew()
         solution = self._act(dt)
         if self.frame.angle != 0.0:
             solution = solution._replace(acceleration=self.frame.leave(solution.acceleration))
         if force is not None and self.lateral is not None:
             felt = force @ self.lateral.robot.axes
-            feel_friction(self._tick, self.robot.data, self.qp.data, felt, dt)
+            tick.feel_friction(self._tick, self.robot.data, self.qp.data, felt, dt)
         return solution
 
     def lateral_state(self) -> Array:
@@ -291,7 +278,7 @@ class EmbeddingController:
 
     def _publish(self) -> None:
         """Write the plan to where ticks read it."""
-        stand(*self._memory)
+        tick.stand(*self._memory)
         self._tick["trim"] = self.learners.trim.acceleration
         path, sideways = self.supervisor.path, None
         if self.lateral is not None:
@@ -307,11 +294,11 @@ class EmbeddingController:
             memory, rows = (*self._memory, self.robot.arrays), (tasks.program, tasks.table)
             self._room, self._kept = room, keep((memory, self._plan, rows, room))
         if tasks.others:
-            advance(self._kept, dt)
+            tick.advance(self._kept, dt)
             tasks.write_others(self.robot, self.references)
-            kind = solve(self._kept, found)
+            kind = tick.solve(self._kept, found)
         else:
-            kind = act(self._kept, found, dt)
+            kind = tick.act(self._kept, found, dt)
         return qp.finish(kind, tasks, found)
 
     def _find_first_slope(self) -> None:

@@ -15,6 +15,7 @@ import numpy as np
 
 from template_control.arrays import Array
 from template_control.checks.fitting import answered_or_none
+from template_control.embedding import replanning
 from template_control.embedding.planned_path import KEPT, PATH, plan_is_due
 from template_control.embedding.planners.planner import (
     Cause,
@@ -25,14 +26,7 @@ from template_control.embedding.planners.planner import (
     settled,
 )
 from template_control.embedding.recovery import Recovery
-from template_control.embedding.replanning import (
-    RULES,
-    Situation,
-    choose_assist,
-    choose_rest,
-    curve_or_step,
-    find_recovery,
-)
+from template_control.embedding.replanning import Situation
 from template_control.embedding.rollout import ReplanOptions, RoutePlanners, TemplateRollout
 from template_control.embedding.standing.planners import STEPS, CurvePlanner
 from template_control.embedding.state import EstimatorState, SectionReport, TemplateState
@@ -236,7 +230,7 @@ class StrideSupervisor:
         ``phase_time`` is along the path [s]; ``height_error`` is of the ground under a foot that
         has landed over the other foot's [m].
         """
-        rule, s = RULES[cause], self._situation(node, sensed, phase_time)
+        rule, s = replanning.RULES[cause], self._situation(node, sensed, phase_time)
         s = s._replace(cause=cause, height_error=height_error)
         if self._recovering and rule.recovers:
             other = self._recover(s, now)
@@ -244,7 +238,7 @@ class StrideSupervisor:
                 return other
             # A stride on the springs keeps what was chosen as the robot broke into it.
             if self._along_curve:
-                self.decision = choose_rest(self._rollout, s) or self.decision
+                self.decision = replanning.choose_rest(self._rollout, s) or self.decision
             return self.follow(node, sensed, now)
         decision = rule.choose(self._rollout, s)
         self.decision = decision or self.decision
@@ -264,7 +258,7 @@ class StrideSupervisor:
         """Break into another stride, if the template completes one; the robot's node in it."""
         if self._recovery is None:
             return None
-        found = find_recovery(self._rollout, s, self._recovery, self._speed_excess)
+        found = replanning.find_recovery(self._rollout, s, self._recovery, self._speed_excess)
         if found is None:
             return None
         self.goal, self.decision = found.goal, found.decision
@@ -309,7 +303,7 @@ class StrideSupervisor:
         The assist is a slope's: it is left to planners of slopes.
         """
         if self._knows_slopes and not self._along_curve:
-            choose_assist(self._rollout, self._situation(node, sensed))
+            replanning.choose_assist(self._rollout, self._situation(node, sensed))
             self._stand_on(self.ground)
 
     def follow(
@@ -334,7 +328,7 @@ class StrideSupervisor:
         self.without_touchdown = angle_drop > 0.0
         if node.name in self.curved:
             s = Situation(node, sensed, self.goal, self.decision)
-            self.goal, self.decision, first = curve_or_step(self._rollout, s, state)
+            self.goal, self.decision, first = replanning.curve_or_step(self._rollout, s, state)
             node = self.automaton.node(first.start)
         else:
             first = self._rollout.simulator.run(node.name, state, u, sensed.toes)

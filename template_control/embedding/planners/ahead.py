@@ -20,6 +20,7 @@ from template_control.slip.gaits.gait import WalkingGait
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import PADDED
 from template_control.slip.parameters import SlipParameters
+from template_control.slip.planning import look_ahead
 from template_control.slip.planning.gait_table import (
     CONTROL,
     CONTROLS,
@@ -31,14 +32,6 @@ from template_control.slip.planning.gait_table import (
     GaitTable,
     gait_table,
     row_at,
-)
-from template_control.slip.planning.look_ahead import (
-    AHEAD,
-    SEARCH,
-    PlanProblem,
-    make_plan,
-    new_problem,
-    step_controls,
 )
 from template_control.slip.planning.plan_costs import (
     SWING,
@@ -56,7 +49,7 @@ SPACING = 0.05
 the reference template; each gait that is made is kept."""
 _SHARES = (1.0, 0.65, 0.4, 0.2, 0.0)  # of the wanted change; 1 only if no search near one failed
 _HOPELESS = 3.0  # cost after two rounds, over the dearest one's, from which on a search is given up
-_NEAR_CHANGE = SEARCH._replace(hopeless=1000.0)  # search near a change of the table
+_NEAR_CHANGE = look_ahead.SEARCH._replace(hopeless=1000.0)  # search near a change of the table
 # Points of each control of the first step, from the best of which plans begin where none is cheap.
 _GRID = 3
 _EFFORT = 12  # linearisations of plans, after which no other change of the table is tried
@@ -155,7 +148,7 @@ class AheadPlanner(Planner):
         *,
         limits: WalkLimits | None = None,
     ) -> None:
-        ready((*WALK, *AHEAD))
+        ready((*WALK, *look_ahead.AHEAD))
         scale = Scale.of(parameters)
         o = self.options = scaled(options or AheadOptions(), scale)
         self._spacing = SPACING * scale.speed
@@ -167,7 +160,7 @@ class AheadPlanner(Planner):
             pace = min(o.pace, _HEAVY_PACE * scale.speed)
             o = self.options = replace(o, changes=0, pace=pace)
         self._costs = plan_costs(parameters, self.limits, o.ease)
-        self._problems: dict[int, tuple[PlanProblem, Kept]] = {}
+        self._problems: dict[int, tuple[look_ahead.PlanProblem, Kept]] = {}
         self._changes, self._map = speed_changes(parameters), ReturnMap(parameters, STRIDE)
         self._first = float(np.clip(speed or np.mean(self.speeds), *self.speeds))
         self._lead_to(self._first)
@@ -257,7 +250,7 @@ class AheadPlanner(Planner):
         judged = _NEVER if next_best is None else (o.cheap, dearest)
         for speed in aims:
             hopeless = np.inf if speed == begun_to else _HOPELESS * min(price, _DEAREST)
-            search = SEARCH._replace(grid=grid, hopeless=hopeless)
+            search = look_ahead.SEARCH._replace(grid=grid, hopeless=hopeless)
             plan = self._look(context, speed, None, search, judged)
             if plan.excess <= o.cheap and plan.cost <= dearest and plan.price < price:
                 if plan.excess <= _BEARABLE:
@@ -294,7 +287,7 @@ class AheadPlanner(Planner):
         """
         steps = self.options.steps if change is None else len(change.controls)
         if steps not in self._problems:
-            problem = new_problem(self._costs, steps)
+            problem = look_ahead.new_problem(self._costs, steps)
             self._problems[steps] = problem, keep(problem)
         p, kept = self._problems[steps]
         p.start[:], p.offset[:], p.linearised[0] = context.z, self.offset, 0
@@ -308,7 +301,7 @@ class AheadPlanner(Planner):
             states[:], free[:], stiffness[:] = change.states[1:], change.controls, change.stiffness
         x, (least, most) = np.empty(len(p.lower)), context.angles
         goal, angles = (speed, change is None), (float(least), float(most))
-        cost, excess, error = make_plan(kept, goal, angles, search, judged, x)
+        cost, excess, error = look_ahead.make_plan(kept, goal, angles, search, judged, x)
         return _Plan(
             effort=int(p.linearised[0]),
             cost=float(cost),
@@ -325,7 +318,7 @@ class AheadPlanner(Planner):
         """The first step of a plan; of a change of speed it accepts as much as the step does."""
         if plan.speed != self._speed:
             self._lead_to(plan.speed)
-        u = step_controls(*plan.first)
+        u = look_ahead.step_controls(*plan.first)
         end, outcome = self._map.step(z, u)  # the plan's is not exact
         end = end + self.offset if outcome is Outcome.SECTION else plan.end
         speed = float(end[0]) if plan.changes else plan.speed
