@@ -138,8 +138,8 @@ class EmbeddingController:
         self.courses: list[Course] = []
         self.lateral: LateralMotion | None = None
         if isinstance(robot, FloatingBaseBiped) and given.lateral is not None:
-            keeps = self.feet, self.references, now["lateral"]
-            self.lateral = LateralMotion(robot, self.parameters, given.lateral, *keeps)
+            keeps = self.observer.now, self.feet, self.references, now["lateral"]
+            self.lateral = LateralMotion(robot, given.lateral, self.supervisor, *keeps)
         self.memory = now, robot.data, self.references.data
         self._memory = *self.memory, self.qp.data
         self._sensed = keep(self._memory)
@@ -413,8 +413,8 @@ class EmbeddingController:
         learners.begin_stride(supervisor, self.mode.trimmed)
         taken = Course()
         if lateral is not None:
-            stride = section, supervisor, course, self.node, s, self.lateral_state(), self.time
-            self._enter(lateral.begin_stride(*stride).name)
+            now, com = self.time, self.lateral_state()
+            self._enter(lateral.begin_stride(section, course, self.node, com, now).name)
             taken = lateral.taken
         self.courses.append(taken._replace(facing=self.robot.facing))
 
@@ -450,7 +450,7 @@ class EmbeddingController:
         along, node = supervisor.phase_time, None
         cause = supervisor.surprise(self.node, deviation, along, now)
         if self.lateral is not None:
-            node = self.lateral.catch(cause, supervisor, self.mode, s, now)
+            node = self.lateral.catch(cause, self.mode, now)
         if node is None and cause is not None:
             node = supervisor.replan(cause, self.node, s, now, phase_time=along)
         if node is not None:

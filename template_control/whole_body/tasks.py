@@ -252,8 +252,7 @@ class SpinTask(CompiledTask):
         weight: of the rows about x, y and z, each over m h^2 [s^4/rad^2]. A moment about the
             vertical comes from the foot's lateral force times its distance ahead, and costs a
             moment about x: so the yaw's weight is the largest.
-        bandwidth: k [1/s].
-        turning: w, angular momentum over m h^2 for each radian of error [1/s].
+        bandwidth, turning: as of a :class:`MomentumTask`; w of each row [1/s].
     """
 
     weight: _Three = tuned((130.0, 130.0, 400.0), PER_RATE_TO_THE_FOURTH)
@@ -289,11 +288,8 @@ class SpareJointTask(CompiledTask):
 
     A point foot is placed by three hinges. Of four, the one about the axis that is nearest to the
     vertical turns the leg about itself. Arms and a waist that move are in no leg. There is room for
-    ``MOST_SPARE`` rows, and those beyond a robot's joints are empty.
-
-    Attributes:
-        weight: [s^4/rad^2].
-        gains: kp [1/s^2] and kd [1/s].
+    ``MOST_SPARE`` rows, and those beyond a robot's joints are empty. Weight and gains are as a
+    :class:`PostureTask` has them.
     """
 
     weight: NotNegative = tuned(1.0, PER_RATE_TO_THE_FOURTH)

@@ -36,7 +36,6 @@ from template_control.slip.gaits.gait import Gait
 from template_control.slip.lateral.gait import LateralOptions, LateralWish, Side
 from template_control.slip.lateral.placing import LATERAL
 from template_control.slip.maps.section import APEX, REST, Section
-from template_control.slip.parameters import SlipParameters
 from template_control.slip.planning.catching import Reach, catching_step
 from template_control.slip.similarity import Scale, scaled
 from template_control.warm_up import ready
@@ -102,21 +101,24 @@ def _steps(gait: Gait) -> bool:
 class LateralMotion:
     """Heading, and footholds to the left and right.
 
-    Every tick updates the nominal ``robot``; ``options`` are not scaled; ``data`` (1,) is of
-    :data:`~.lateral.LATERAL`. Courses are followed by ramps: a jump would move the periodic motion
-    further than one step reaches.
+    Every tick updates the nominal ``robot``, and what is ``sensed`` of it; ``options`` are not
+    scaled; ``data`` (1,) is of :data:`~.lateral.LATERAL`. Courses are followed by ramps: a jump
+    would move the periodic motion further than one step reaches.
     """
 
     def __init__(
         self,
         robot: FloatingBaseBiped,
-        parameters: SlipParameters,
         options: LateralOptions,
+        supervisor: StrideSupervisor,
+        sensed: TemplateState,
         feet: Feet,
         references: References,
         data: Any,
     ) -> None:
         ready(LATERAL)
+        self._supervisor, self._sensed = supervisor, sensed
+        parameters = supervisor.parameters
         scale = self._scale = Scale.of(parameters)
         step = self.step_width = scaled(options, scale).step_width
         self.stand_width = SOLE_STAND * parameters.rest_length if robot.patches else step
@@ -148,26 +150,19 @@ class LateralMotion:
             speed = (speed - s.momentum[0] / (self.robot.mass * height)) * self.robot.sway
         return np.array([s.com[_SIDE], speed])
 
-    def catch(
-        self,
-        cause: Cause | None,
-        supervisor: StrideSupervisor,
-        mode: Mode,
-        sensed: TemplateState,
-        now: float,
-    ) -> Node | None:
+    def catch(self, cause: Cause | None, mode: Mode, now: float) -> Node | None:
         """Let a robot on soles step that is pushed too hard to stand; its node in that step.
 
         After a deviation, the ``cause`` of a new plan, the rest of a step is planned anew.
         """
-        robot, data, in_air = self.robot, self.robot.data[0], None
+        robot, data, supervisor, in_air = self.robot, self.robot.data[0], self._supervisor, None
         swings = mode.control.swings if mode.control.follow_curve else ()
         if robot.patches and cause is Cause.DEVIATION and swings:
             due = supervisor.time_of(Event.TOUCHDOWN) - supervisor.phase_time
             in_air = self._feet.foot_of_leg[swings[0]], due
         elif not self.planner.data[0]["leaves"]:
             return None
-        x, height, speed, _ = sensed.state.tolist()
+        x, height, speed, _ = self._sensed.state.tolist()
         height = max(height, LOWEST * robot.leg_length)
         y, sideways = self.state(height, True)
         level = [level_reach(data, foot, data["foot_position"][foot, UP]) for foot in range(2)]
@@ -179,7 +174,7 @@ class LateralMotion:
         )
         motion = np.array([[x, y], [speed, sideways]])
         step = catching_step(motion, robot.space.foot_position[:, :2], reach, in_air)
-        node = supervisor.catch(mode.node, step, sensed, now)
+        node = supervisor.catch(mode.node, step, self._sensed, now)
         self.planner.data["catches"] = node is not None
         return node
 
@@ -237,24 +232,18 @@ class LateralMotion:
         self._stood[:] = (self._stood - about) @ [[c, -s], [s, c]] + about
 
     def begin_stride(
-        self,
-        section: Section,
-        supervisor: StrideSupervisor,
-        course: Course,
-        node: Node,
-        sensed: TemplateState,
-        com: Array,
-        time: float,
+        self, section: Section, course: Course, node: Node, com: Array, now: float
     ) -> Node:
         """Take note of the stride that begins, and let it end sooner where that is better.
 
         ``com`` (2,) is :meth:`state`. The supervisor, which has decided the stride, follows another
         decision where there is a better one; returns the node that the robot is in then.
         """
-        planner, gait = self.planner, supervisor.planner.gait
-        planner.data["section_began"] = time
+        planner, supervisor = self.planner, self._supervisor
+        gait = supervisor.planner.gait
+        planner.data["section_began"] = now
         if not _steps(gait):
-            self._stand(section, supervisor)
+            self._stand(section)
             return node
         scale, turning = self._scale, TURN_RAMP if node.stance else RUN_RAMP
         turn_ramp = TURN_RAMPS.get(gait.stride, turning) / scale.time**2
@@ -277,14 +266,14 @@ class LateralMotion:
             if decision is supervisor.decision:
                 return node
             supervisor.decision = decision
-            return supervisor.follow(node, sensed, time)
+            return supervisor.follow(node, self._sensed, now)
 
         def look(decision: Decision) -> LateralForecast:
             follow(decision)
             feet = self._stood[list(supervisor.feet), _SIDE]
             return planner.forecast(supervisor.path, com, feet)
 
-        self._turn_trunk(gait.step_duration, time, 0.0 if node.stance else float(z[0]))
+        self._turn_trunk(gait.step_duration, now, 0.0 if node.stance else float(z[0]))
         if not node.stance:
             planner.due = inf
             return node
@@ -302,7 +291,7 @@ class LateralMotion:
         turns = min(max(course.away(self.robot) / constant, -fastest), fastest)
         return np.array([course.left, course.turning, turns])
 
-    def _stand(self, section: Section, supervisor: StrideSupervisor) -> None:
+    def _stand(self, section: Section) -> None:
         """A stride that leads to a stand, or from it to a walk: it goes straight on.
 
         A foot that lands in it goes to where the last gait's would, or after a walk to the left,
@@ -311,13 +300,13 @@ class LateralMotion:
         planner = self.planner
         self._now[:], self._turns = 0.0, 0.0
         left = 0.0 if section is REST else planner.wish.left
-        gait = supervisor.planner.next_gait()
+        gait = self._supervisor.planner.next_gait()
         width = self.stand_width if gait is None else self._width
         planner.wish = LateralWish(width, left)
         planner.walk(gait)
         self._turn_trunk(1.0, 0.0)
         planner.aim(self._side(self._feet.landed))
-        planner.due = supervisor.time_of(Event.TOUCHDOWN)
+        planner.due = self._supervisor.time_of(Event.TOUCHDOWN)
 
     def _turn_trunk(self, duration: float, time: float, speed: float = 0.0) -> None:
         """Turn the trunk in the stride that begins, as much as the axes turn at its end.
