@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.compiled import compiled
 from template_control.robot.biped import Biped
 from template_control.robot.planar_biped import PlanarBiped
@@ -123,7 +123,7 @@ class SlopeFrame:
         """(..., 2) places in the world, from these axes [m]."""
         return (place * self._along - self._shift) @ self._turn
 
-    def foothold(self, foot: int) -> tuple[float, float]:
+    def foothold(self, foot: int) -> Pair:
         """x and height of a foot in the world [m]."""
         x, height = self.world(self._robot.foot_position[foot]).tolist()
         return x, height

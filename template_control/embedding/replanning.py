@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.embedding.planners.planner import (
     Cause,
     Context,
@@ -161,7 +161,7 @@ class Situation(NamedTuple):
     height_error: float = 0.0  # of the ground under the foot that has landed over the other's [m]
 
 
-def reachable_angles(rollout: TemplateRollout, s: Situation) -> tuple[float, float]:
+def reachable_angles(rollout: TemplateRollout, s: Situation) -> Pair:
     """Least and greatest touchdown angle that the swing foot can still land with [rad]."""
     planners, u = rollout.planners, s.decision.controls
     change, angle = reachable_turn(rollout.scale, s.to_go), float(u[Slot.TOUCHDOWN_ANGLE])
@@ -175,9 +175,7 @@ def reachable_angles(rollout: TemplateRollout, s: Situation) -> tuple[float, flo
     return min(angle - change, most), most
 
 
-def choose_all_controls(
-    rollout: TemplateRollout, s: Situation, angles: tuple[float, float]
-) -> Decision | None:
+def choose_all_controls(rollout: TemplateRollout, s: Situation, angles: Pair) -> Decision | None:
     """Decide anew at the section state from which the template would have come to here.
 
     Where no stride goes on from there, the gait's legs may have led to here from another one. The

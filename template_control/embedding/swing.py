@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.checks.checked import Checked
 from template_control.checks.ranges import NotNegative, Positive, Share
 from template_control.compiled import compiled
@@ -202,9 +202,7 @@ def wait(f: Any, foot: int, x: Array, place: float, speed: float) -> None:
 
 
 @compiled
-def meet_wall(
-    f: Any, foot: int, x: Array, y: Array, at: Array, aim: tuple[float, float], dt: float
-) -> None:
+def meet_wall(f: Any, foot: int, x: Array, y: Array, at: Array, aim: Pair, dt: float) -> None:
     """Go up along a wall that a foot has met, and stay above it from then on; or down.
 
     ``at`` (3,) is the foot, forward first and up last [m]; ``aim`` is x of the foothold [m], not
@@ -231,9 +229,7 @@ def drop(f: Any, foot: int, x: Array, y: Array, dt: float) -> None:
 
 
 @compiled
-def furthest(
-    share: float, hip: tuple[float, float], height: float, sideways: float, leg_length: float
-) -> float:
+def furthest(share: float, hip: Pair, height: float, sideways: float, leg_length: float) -> float:
     """The furthest x that a share of a straight leg's length reaches at a foot's height [m].
 
     ``hip`` is its x and y, ``sideways`` how far the leg leans to a side [m].
@@ -243,7 +239,7 @@ def furthest(
 
 
 @compiled
-def level_reach(r: Any, foot: int, height: float) -> tuple[float, float]:
+def level_reach(r: Any, foot: int, height: float) -> Pair:
     """y below the hip of a flat foot, and how far to either side of it its sole is level [m].
 
     ``r`` is of ``ROBOT_DATA``, ``height`` the foot's [m]. Where the leg leans further, the ankle

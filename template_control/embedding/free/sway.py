@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.compiled import compiled
 from template_control.embedding.planned_path import PlainCurve
 from template_control.robot.terms import onward
@@ -250,13 +250,7 @@ def closing_foothold(t: Any, r: Any, stands: int, lasts: float) -> float:
 
 
 @compiled
-def distance_aside(
-    point: float,
-    growth: float,
-    edge: float,
-    shares: tuple[float, float],
-    steps: tuple[float, float],
-) -> float:
+def distance_aside(point: float, growth: float, edge: float, shares: Pair, steps: Pair) -> float:
     """Distance of a foothold to the side, with the capture point on the line between both feet [m].
 
     There is no ground off that line to hold the CoM on. It is the gait's, the first of
@@ -275,7 +269,7 @@ def distance_aside(
 
 
 @compiled
-def _shares_ahead(t: Any, r: Any, stands: int, lasts: float) -> tuple[float, float]:
+def _shares_ahead(t: Any, r: Any, stands: int, lasts: float) -> Pair:
     """Least and largest share of the next step's length at which the capture point may be taken.
 
     That is as the foot which is in the air lands, ahead of the one that ``stands``.
@@ -297,7 +291,7 @@ def _rate(t: Any, r: Any) -> float:
 
 
 @compiled
-def front_shares(along: float, apart: float, half: float) -> tuple[float, float]:
+def front_shares(along: float, apart: float, half: float) -> Pair:
     """Least and largest share of the load that the front foot can bear.
 
     The centre of pressure is ``along`` ahead of the rear foot's middle, the front foot's is
@@ -311,9 +305,7 @@ def front_shares(along: float, apart: float, half: float) -> tuple[float, float]
 
 
 @compiled
-def _shares_of_lifting(
-    t: Any, r: Any, curve: PlainCurve, stays: int, after: float
-) -> tuple[float, float]:
+def _shares_of_lifting(t: Any, r: Any, curve: PlainCurve, stays: int, after: float) -> Pair:
     """Least and largest share that the foot which lifts off can bear, ``after`` some time [s].
 
     By the centre of pressure that the curve has ahead: of two soles, one ahead of the other, the

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Positive, Range
 from template_control.embedding.planners.lqr import WALK, LqrPlanner
@@ -168,7 +168,7 @@ class AheadPlanner(Planner):
         self.offset = self._lqr.offset
 
     @property
-    def speeds(self) -> tuple[float, float]:
+    def speeds(self) -> Pair:
         """Slowest and fastest dx/dt at VLO [m/s]."""
         return float(self.table.speed[0]), float(self.table.speed[-1])
 
@@ -279,7 +279,7 @@ class AheadPlanner(Planner):
         speed: float,
         change: SpeedChange | None,
         search: Search,
-        judged: tuple[float, float],
+        judged: Pair,
     ) -> _Plan:
         """A plan to a speed, near a change of speed or near its gait.
 

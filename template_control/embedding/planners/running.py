@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Index, Interval, Positive
 from template_control.compiled import compiled
@@ -53,10 +53,10 @@ _MISS = 0.1  # [m/s], for the reference template
 def leg_bounds(
     z: Array,
     legs: Array,
-    angles: tuple[float, float],
+    angles: Pair,
     rest_length: float,
     change: tuple[float, float, float],
-    stiffness_range: tuple[float, float],
+    stiffness_range: Pair,
 ) -> Array:
     """Controls (4, 3) of a :class:`~.stride_solver.Prior` about a gait's.
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from template_control.arrays import Array, BoolArray
+from template_control.arrays import Array, BoolArray, Pair
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import Interval, Positive
 from template_control.embedding.planners.planner import (
@@ -169,7 +169,7 @@ class TransitionPlanner(Planner):
         predicted = self._map.sections[1].padded(wanted if end is None else end)
         return Decision(u, predicted, end is not None, end is not None, False)
 
-    def _prior(self, z: Array, angles: tuple[float, float]) -> Prior:
+    def _prior(self, z: Array, angles: Pair) -> Prior:
         o, p = self.options, self._before.gait.parameters
         slots, turns = [int(slot) for slot in o.slots], _turns(o.slots)
         base = np.array(o.base) * np.where(turns, 1.0, p.mass * p.gravity / p.rest_length)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.checks.checked import Checked, checked
 from template_control.checks.ranges import NotNegative, Positive
 from template_control.robot.start import Pose
@@ -153,7 +153,7 @@ class BetweenFeet:
     and acceleration.
     """
 
-    toes: tuple[float, float]
+    toes: Pair
     parameters: SlipParameters
     options: StandingOptions
 

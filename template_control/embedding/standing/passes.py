@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.embedding.standing.curves import CLOSING, BetweenFeet, StandingOptions
 from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import Event, Slot, StrideKind
@@ -91,7 +91,7 @@ class PassTable:
         ground = replace(self.parameters, slope=slope)
         return PassTable(ground, self.options, self.family)
 
-    def feet(self, toes: tuple[float, float]) -> BetweenFeet:
+    def feet(self, toes: Pair) -> BetweenFeet:
         """Both feet on the ground, at x of the rear and the front one [m]."""
         return BetweenFeet(toes, self.parameters, self.options)
 
@@ -130,7 +130,7 @@ class PassTable:
         return SingleSupportPass(vlo, stiffness, states * _MIRROR)
 
     def best_touchdown(
-        self, z: Array, angles: tuple[float, float], speeds: Sequence[float] = ()
+        self, z: Array, angles: Pair, speeds: Sequence[float] = ()
     ) -> Touchdown | None:
         """The step from a VLO state z (3,) after which the first speed at VLO can be had [m/s].
 
@@ -170,7 +170,7 @@ class PassTable:
         speed = float(speeds[at]) if len(speeds) else 0.0
         return Touchdown(float(steps[i, 0]), float(steps[i, 1]), speed)
 
-    def _touchdowns(self, z: Array, stiffness: float, angles: tuple[float, float]) -> Array:
+    def _touchdowns(self, z: Array, stiffness: float, angles: Pair) -> Array:
         """Steps (n, 7) from one way past VLO: the foot lands when the CoM sinks to its leg.
 
         Angle and stiffness, the CoM's x, y and dx/dt, x of the foot, and by how much it lands later

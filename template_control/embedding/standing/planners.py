@@ -12,7 +12,7 @@ from functools import reduce
 
 import numpy as np
 
-from template_control.arrays import Array
+from template_control.arrays import Array, Pair
 from template_control.checks.checked import checked
 from template_control.embedding.planners.planner import Context, Decision, Planner, RestContext
 from template_control.embedding.standing.curves import PLACE, BetweenFeet, Found, StandingOptions
@@ -129,7 +129,7 @@ class CurvePlanner(Planner):
         self,
         node: str,
         start: Array,
-        toes: tuple[float, float],
+        toes: Pair,
         decision: Decision,
         catching: CatchingStep | None = None,
     ) -> tuple[Decision, Stride]:
@@ -204,7 +204,7 @@ class CurvePlanner(Planner):
         self,
         node: str,
         start: Array,
-        toes: tuple[float, float],
+        toes: Pair,
         decision: Decision,
         catching: CatchingStep | None,
     ) -> tuple[Decision, Stride]:
