@@ -7,9 +7,8 @@ stand that is pushed too hard makes a step.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,18 +24,6 @@ from template_control.slip.scenario.route import StrideGoal
 from template_control.slip.scenario.scenario import STAND_HEIGHT
 from template_control.slip.similarity import REFERENCE, SPEED, Scale, scaled, tuned
 
-
-class Exit(NamedTuple):
-    """A way out of a stride, at a ``node`` of the automaton, into another kind of stride.
-
-    ``entry`` is the node where that one goes on.
-    """
-
-    node: str
-    stride: str
-    entry: str
-
-
 _BOTH_STAND = ("DS_sc^w", "DS_sd^w", "DS_sc^wp", "DS_sd^wp")
 _BEFORE_VLO = ("SS_bv^w", "SS_bv^wp")
 TO_REST = ("DS_ar^s", "DS_br^ws", "DS_br^sf")
@@ -45,18 +32,18 @@ _START = AUTOMATON.starts[StrideKind.STAND_TO_WALK]
 _CURVED = (*TO_REST, _START, "DS_bl^ww")
 _STEPS = (StrideKind.STEP_FORWARD, StrideKind.STEP_BACK)
 
-EXITS: tuple[Exit, ...] = (
-    *(Exit(node, StrideKind.WALK_TO_RUN, entry) for node, entry in RUN_ON.items()),
-    *(Exit(node, StrideKind.CHANGE_SPEED, "DS_bl^ww") for node in _BOTH_STAND),
-    *(Exit(node, StrideKind.WALK_TO_STAND, "DS_br^ws") for node in _BOTH_STAND),
-    Exit("DS_bl^ww", StrideKind.WALK_TO_STAND, "DS_br^ws"),
-    *(Exit(node, StrideKind.STEP_BACK, "SS_bt^sb") for node in _BEFORE_VLO),
-    *(Exit(node, step, AUTOMATON.starts[step]) for node in (*TO_REST, _START) for step in _STEPS),
-)
-"""All of them. A fast walk runs. The springs of a slow one would throw it back: a curve in time
-carries the CoM while both feet stand, on or to rest; the foot that is up is set down behind again.
-Where both feet stand and the CoM cannot come to rest, or not start, a step is made; where it cannot
-come to another speed, it comes to rest."""
+EXITS: Mapping[tuple[str, str], str] = {
+    **{(node, StrideKind.WALK_TO_RUN): entry for node, entry in RUN_ON.items()},
+    **{(node, StrideKind.CHANGE_SPEED): "DS_bl^ww" for node in _BOTH_STAND},
+    **{(node, StrideKind.WALK_TO_STAND): "DS_br^ws" for node in (*_BOTH_STAND, "DS_bl^ww")},
+    **{(node, StrideKind.STEP_BACK): "SS_bt^sb" for node in _BEFORE_VLO},
+    **{(node, step): AUTOMATON.starts[step] for node in (*TO_REST, _START) for step in _STEPS},
+}
+"""Ways out of a stride: by node of the automaton and other kind of stride, the node where that one
+goes on. A fast walk runs. The springs of a slow one would throw it back: a curve in time carries
+the CoM while both feet stand, on or to rest; the foot that is up is set down behind again. Where
+both feet stand and the CoM cannot come to rest, or not start, a step is made; where it cannot come
+to another speed, it comes to rest."""
 
 
 def entry(node: str, left: str, stride: str) -> str | None:
@@ -65,15 +52,16 @@ def entry(node: str, left: str, stride: str) -> str | None:
     The robot is in ``node`` of the kind of stride that is ``left``; the same kind goes on where it
     is.
     """
-    if stride == left:
-        return node
-    ways = (way.entry for way in EXITS if way.node == node and way.stride == stride)
-    return next(ways, None)
+    return node if stride == left else EXITS.get((node, stride))
 
 
-def ways_to_rest(node: str) -> list[Exit]:
-    """Ways to a stand from a ``node`` in which a curve carries the CoM, the first one first."""
-    return [way for way in EXITS if way.node == node and node in _CURVED]
+def ways_to_rest(node: str) -> list[tuple[str, str]]:
+    """Ways to a stand from a ``node`` in which a curve carries the CoM, the first one first.
+
+    Of each the kind of stride, and the node where it goes on.
+    """
+    ways = ((stride, entry) for (at, stride), entry in EXITS.items() if at == node)
+    return list(ways) if node in _CURVED else []
 
 
 _WALKS = (StrideKind.WALK, StrideKind.WALK_PUSH_OFF)

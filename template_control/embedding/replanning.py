@@ -366,12 +366,12 @@ def curve_or_step(
     decision, stride = rollout.curve(node, s.sensed, state, planner, s.decision)
     # A curve to a liftoff that is not quite feasible leads there all the same, if it is lasting.
     leads = decision.feasible or (decision.lasting and node not in TO_REST)
-    for way in () if leads else ways_to_rest(node):
-        other = planners.planners.get(way.stride)
+    for kind, begins in () if leads else ways_to_rest(node):
+        other = planners.planners.get(kind)
         if other is None:
             continue
-        instead, rest = rollout.curve(way.entry, s.sensed, state, other, settled(other.gait))
+        instead, rest = rollout.curve(begins, s.sensed, state, other, settled(other.gait))
         if instead.feasible:
-            goal = replace(s.goal, stride=way.stride, target=other.gait.state)
+            goal = replace(s.goal, stride=kind, target=other.gait.state)
             return goal, instead, rest
     return s.goal, decision, stride

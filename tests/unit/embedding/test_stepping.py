@@ -87,7 +87,7 @@ def test_a_step_is_made_where_the_feet_do_not_hold(planners, speed, holds, kind)
     assert stand.feasible == holds
     fit = [
         other
-        for other in (way.stride for way in ways_to_rest(node))
+        for other, _ in ways_to_rest(node)
         if planners[other]
         .curve(AUTOMATON.starts[other], start, toes, planners[other].decide(Context(z)))[0]
         .feasible
