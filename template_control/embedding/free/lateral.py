@@ -191,11 +191,9 @@ class LateralPlanner:
         self._lateral: LateralGait
         self._aim = _NO_AIM
         self._stretch = 1.0
-        self._planar: TemplatePath | None = None
         self._path: LateralPath
-        self._landed: Placement | None = None
-        self.due = np.inf  # time from the section to the template's touchdown [s]; inf: in flight
         data["hold"], data["duration"] = self.options.hold, 1.0
+        self.reset(None)
 
     @property
     def learnt(self) -> LateralLearnt:
@@ -212,10 +210,11 @@ class LateralPlanner:
 
     def reset(self, gait: Gait | None) -> None:
         """Begin anew with a gait, or with none; nothing is learnt yet."""
-        self._planar = None
+        self._planar: TemplatePath | None = None
         self.lessons.clear()
         self.data["placed"] = 0
-        self._landed, self.due = None, np.inf
+        self._landed: Placement | None = None
+        self.due = np.inf  # time from the section to the template's touchdown [s]; inf: in flight
         self.walk(gait)
 
     def walk(self, gait: Gait | None) -> None:

@@ -81,9 +81,7 @@ class PassTable:
         self._known: dict[float, SingleSupportPass] = {}
         # Uphill the CoM is behind the foot at VLO, and has to come over it.
         uphill = max(np.tan(parameters.slope), 0.0) * np.sqrt(parameters.gravity * options.height)
-        slowest = _SLOWEST * parameters.speed_unit
-        if uphill:
-            slowest = float(np.hypot(slowest, uphill))
+        slowest = float(np.hypot(_SLOWEST * parameters.speed_unit, uphill))
         self._speeds = np.linspace(slowest, family.speeds[1], _SPEEDS)
 
     def on_slope(self, slope: float) -> PassTable:
