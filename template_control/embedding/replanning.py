@@ -69,6 +69,8 @@ TRIES = 36
 _EFFORT = 0.1  # what a change that counts as 1 adds to the planner's price
 _ASSIST = 1.5  # largest change of the forward acceleration that two legs add in such a step [m/s^2]
 
+_Price = Callable[[Array], float]  # of an end, to the planner of the next stride; nan: none known
+
 
 def free_controls(automaton: Automaton, node: Node) -> list[int]:
     """Slots of the stiffnesses on which the rest of a stride depends, from a node on."""
@@ -83,14 +85,13 @@ def choose_legs(
     free: Sequence[int],
     nominal: Array,
     scale: Scale,
-    price: Callable[[Array], float] | None = None,
+    price: _Price | None = None,
 ) -> Decision:
     """The decision with the stiffnesses that lead the rest of a stride to the cheapest end.
 
     Without a price that is the end nearest to the target. ``ahead`` is the end by the controls,
     ``target`` (n,) the wanted one; ``free`` are slots of the stiffnesses that the rest of the
-    stride depends on, ``nominal`` (NUM_SLOTS,) the gait's controls. ``price`` is an end's to the
-    planner of the next stride; nan: it knows none.
+    stride depends on, ``nominal`` (NUM_SLOTS,) the gait's controls.
     """
     stiff = [slot for slot in free if slot != Slot.TOUCHDOWN_ANGLE and nominal[slot] > 0.0]
     base = nominal[stiff]
@@ -108,12 +109,7 @@ def choose_legs(
 
 
 def _cheapest(
-    u: Array,
-    end: Array | None,
-    prior: Prior,
-    ahead: StrideEnd,
-    price: Callable[[Array], float],
-    gait: Array,
+    u: Array, end: Array | None, prior: Prior, ahead: StrideEnd, price: _Price, gait: Array
 ) -> tuple[Array, Array | None]:
     """The cheapest of a grid within the bounds, and of controls ``u`` that lead to ``end``.
 

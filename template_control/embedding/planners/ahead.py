@@ -274,18 +274,13 @@ class AheadPlanner(Planner):
                 yield goal, way
 
     def _look(
-        self,
-        context: Context,
-        speed: float,
-        change: SpeedChange | None,
-        search: Search,
-        judged: Pair,
+        self, context: Context, speed: float, way: SpeedChange | None, search: Search, judged: Pair
     ) -> _Plan:
         """A plan to a speed, near a change of speed or near its gait.
 
         ``judged`` are the excess and the cost up to which its roughness counts.
         """
-        steps = self.options.steps if change is None else len(change.controls)
+        steps = self.options.steps if way is None else len(way.controls)
         if steps not in self._problems:
             problem = look_ahead.new_problem(self._costs, steps)
             self._problems[steps] = problem, keep(problem)
@@ -297,10 +292,10 @@ class AheadPlanner(Planner):
             lifted = min(lifted, self.limits.swing * lifted / (lifted + due))
         p.lifted[0] = lifted
         states, free, stiffness, *_ = p.reference
-        if change is not None:
-            states[:], free[:], stiffness[:] = change.states[1:], change.controls, change.stiffness
+        if way is not None:
+            states[:], free[:], stiffness[:] = way.states[1:], way.controls, way.stiffness
         x, (least, most) = np.empty(len(p.lower)), context.angles
-        goal, angles = (speed, change is None), (float(least), float(most))
+        goal, angles = (speed, way is None), (float(least), float(most))
         cost, excess, error = look_ahead.make_plan(kept, goal, angles, search, judged, x)
         return _Plan(
             effort=int(p.linearised[0]),
@@ -310,7 +305,7 @@ class AheadPlanner(Planner):
             speed=speed,
             first=(x[:CONTROLS], float(stiffness[0])),
             end=p.ends[0].copy(),
-            changes=change is not None and steps > 1,
+            changes=way is not None and steps > 1,
             price=float(cost + error**2),
         )
 
