@@ -22,7 +22,9 @@ from numba.extending import overload
 Function = Callable[..., Any]
 
 _PACKAGE = Path(__file__).parent
-_IMPORT = re.compile(rb"^(?:from|import) (template_control[\w.]*)", re.MULTILINE)
+_IMPORT = re.compile(
+    r"^(?:from|import) (template_control[\w.]*)(?: import (\([\w,\s]*\)|[\w, ]*))?", re.MULTILINE
+)
 _KEPT = 3  # folders: switching between revisions of the sources does not compile again
 
 
@@ -104,8 +106,11 @@ def _digest() -> str:
 
 
 def _imported(source: bytes) -> list[str]:
-    """Modules that a source imports."""
-    return [name.decode() for name in _IMPORT.findall(source)]
+    """Modules that a source imports, and names in them, which may be modules."""
+    found = []
+    for module, names in _IMPORT.findall(source.decode()):
+        found += [module, *(f"{module}.{name}" for name in re.findall(r"\w+", names))]
+    return found
 
 
 def _cached(function: Function, options: dict[str, Any]) -> Any:

@@ -108,9 +108,9 @@ def test_the_digest_covers_what_compiled_code_depends_on_and_no_more(tmp_path, m
     def digest():
         return compiled._digest()
 
-    def append(name):
+    def append(name, text="# changed\n"):
         path = tmp_path / "template_control" / name
-        path.write_text(path.read_text() + "\n# changed\n")
+        path.write_text(f"{path.read_text() if path.exists() else ''}\n{text}")
 
     shutil.copytree(PACKAGE, tmp_path / "template_control", ignore=shutil.ignore_patterns("__*__"))
     monkeypatch.setattr(compiled, "_PACKAGE", tmp_path / "template_control")
@@ -119,6 +119,11 @@ def test_the_digest_covers_what_compiled_code_depends_on_and_no_more(tmp_path, m
     assert digest() == found[0]
     for name in ("slip/dynamics/guards.py", "slip/automaton/vocabulary.py", "compiled.py"):
         append(name)
+        found.append(digest())
+    for names in ("NUM_EVENTS, numbers", "(\n    more_numbers,\n)"):  # modules, by a package
+        append("slip/dynamics/guards.py", f"from template_control.slip import {names}\n")
+        found.append(digest())
+        append(f"slip/{'more_numbers' if '(' in names else 'numbers'}.py")
         found.append(digest())
     assert len(set(found)) == len(found)
 
