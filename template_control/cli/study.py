@@ -9,6 +9,7 @@ from typing import Any
 from template_control import settings
 from template_control.checks import option_types as values
 from template_control.cli.trial_options import Report, add_trial_options, report_trials
+from template_control.storage import writing
 from template_control.sweep.study import Study, run_study
 from template_control.sweep.sweep import SweepResult
 from template_control.view.trial_figures import study_figure
@@ -28,14 +29,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Run the trials that are missing, and print all; returns 0, or 130 after Ctrl-C."""
     study = Study.load(options.study)
-    folder = Path(options.output or Path("runs/study") / options.study.stem)
-    folder.mkdir(parents=True, exist_ok=True)
-    return report_trials(
-        options,
-        folder,
-        lambda pool: run_study(study, folder / "trials.jsonl", pool),
-        lambda result, _: _report(study, result, options.study.stem),
-    )
+    with writing(options.output or Path("runs/study") / options.study.stem) as folder:
+        return report_trials(
+            options,
+            folder,
+            lambda pool: run_study(study, folder / "trials.jsonl", pool),
+            lambda result, _: _report(study, result, options.study.stem),
+        )
 
 
 def _report(study: Study, result: SweepResult, name: str) -> Report:

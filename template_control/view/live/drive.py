@@ -24,6 +24,7 @@ from template_control.run.live import LiveRun, Tick
 from template_control.run.record import Record
 from template_control.run.velocity import VelocityCommand, VelocityRange
 from template_control.slip.maps.section import APEX, REST, VLO
+from template_control.storage import writing
 from template_control.view.browser import PORTS, show_in_browser
 from template_control.view.live.pace import Pace
 from template_control.view.live.page import Controls, Figures, Plots, Step, first_push
@@ -203,10 +204,10 @@ class Drive(AbstractContextManager["Drive"]):
         self._show(1)
 
     def _save(self) -> None:
-        self._folder.mkdir(parents=True, exist_ok=True)
-        self.record().save(self._folder / "run.npz")
-        self.experiment().save(self._folder / "run.toml")
-        self._say(f"{self._folder}: run.npz, and run.toml, which repeats the run from its start")
+        with writing(self._folder) as folder:
+            self.record().save(folder / "run.npz")
+            self.experiment().save(folder / "run.toml")
+        self._say(f"{folder}: run.npz, and run.toml, which repeats the run from its start")
 
     def _restart(self) -> None:
         """Begin a run at the first speed; the world is the experiment's."""

@@ -254,13 +254,16 @@ with writing(Path(sys.argv[1])):
         ["reproduce", "fig6"],
         ["campaign", "--trials", "1"],
         ["robustness", "--quick"],
+        ["study", "STUDY"],
     ],
 )
 def test_a_folder_belongs_to_one_command_at_a_time(words, tmp_path, refused):
     scenario = tmp_path / "scenario.toml"
     scenario.write_text('[[segment]]\ngait = "walk"\nspeed = 1.1\nsteps = 1\n')
-    folder = tmp_path / "runs"
-    words = [str(scenario) if word == "SCENARIO" else word for word in words]
+    study = tmp_path / "study.toml"
+    study.write_text("[grid]\ndelay = [0.0]\n")
+    folder, files = tmp_path / "runs", {"SCENARIO": scenario, "STUDY": study}
+    words = [str(files.get(word, word)) for word in words]
     with subprocess.Popen(
         [sys.executable, "-c", HOLDER, str(folder)],
         stdin=subprocess.PIPE,

@@ -75,6 +75,12 @@ def test_a_wrong_study_is_one_line(text, why, tmp_path, refused):
     assert why in refused(["study", str(path), "--output", str(tmp_path / "out")])
 
 
+def test_a_study_in_a_folder_that_cannot_be_made_is_one_line(tmp_path, refused):
+    path = tmp_path / "study.toml"
+    path.write_text("[grid]\ndelay = [0.0]\n")
+    assert "cannot write to /proc/none" in refused(["study", str(path), "--output", "/proc/none"])
+
+
 def test_a_figure_that_no_run_has_is_said(tmp_path):
     study = tc.sweep.Study(experiment={"steps": 1}, grid={"delay": (0.0,)}, figures=("none",))
     with ThreadPoolExecutor(1) as pool:

@@ -265,6 +265,10 @@ def test_a_robot_is_driven_in_a_browser(tmp_path):
         until(lambda: "; reset begins anew" in tab.text(), "the page says so")
         notices = until(lambda: tab.text().count("Reset begins anew"), "and notifies")
         assert notices == 1, "once"
+        (tmp_path / "kept").touch()
+        tab.click("button", "save")
+        until(lambda: "cannot write to" in tab.text(), "the page says so")
+        (tmp_path / "kept").unlink()
         tab.click("button", "save")
         until(lambda: (tmp_path / "kept" / "run.toml").exists(), "it is saved")
         tab.click("button", "reset")
