@@ -105,8 +105,13 @@ class Tab:
     def click(self, selector, label=None, across=0.5):
         """Click an element, ``across`` of its width from its left."""
         place = partial(self.place, selector, label)
-        # What is still being laid out moves.
-        until(lambda: place() and place() == place(), f"{selector} {label} is there")
+
+        def steady():
+            first = place()
+            time.sleep(0.2)  # [s]; what is still being laid out moves
+            return first and first == place()
+
+        until(steady, f"{selector} {label} is there")
         left, top, width, height = place()
         at = {"x": left + across * width, "y": top + 0.5 * height, "button": "left"}
         for kind in ("mousePressed", "mouseReleased"):

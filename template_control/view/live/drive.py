@@ -263,7 +263,7 @@ class Drive(AbstractContextManager["Drive"]):
         self._plots.add(now, (wanted, self.step.speed, *self._figures.of(columns)))
 
     def _tell(self) -> None:
-        """Plots, and a line about the run."""
+        """Plots, and two lines about the run; a third would move the controls below them."""
         run, tick = self._going, self.tick
         state = _GAITS[run.controller.supervisor.reports[-1].section]
         if run.ended:
@@ -271,10 +271,9 @@ class Drive(AbstractContextManager["Drive"]):
         if not run.ended and self.paused:
             state = "halted"
         late, self._late = self.pace.late - self._late, self.pace.late
-        slow = "; frames are late: this machine is too slow" if late > _MANY_LATE * _DRAWN else ""
-        self._status.content = (
-            f"{tick.time:.1f} s, {tick.steps} steps, {self.step.speed:.2f} m/s; **{state}**{slow}"
-        )
+        slow = "; frames are late: slow machine" if late > _MANY_LATE * _DRAWN else ""
+        line = f"{tick.time:.1f} s, {tick.steps} steps, {self.step.speed:.2f} m/s"
+        self._status.content = f"{line}  \n**{state}**{slow}"
         self._plots.draw()
 
 

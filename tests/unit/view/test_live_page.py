@@ -245,6 +245,15 @@ def test_a_robot_is_driven_in_a_browser(tmp_path):
         tab.press(" ")
         until(lambda: page.paused, "it is halted")
         until(lambda: "halted" in tab.text(), "the page says so")
+        # A hint comes and goes, and the controls stay where they are.
+        at = tab.place(".mantine-Slider-track")
+
+        def late():
+            page.pace.late += 100  # frames
+            return "frames are late" in tab.text()
+
+        until(late, "the page says that it is too slow")
+        assert tab.place(".mantine-Slider-track") == at
         halted = page.tick
         tab.click("button", "tick")
         until(lambda: page.tick.number == halted.number + 1, "one tick is made")
