@@ -146,7 +146,9 @@ def _stride_slopes(problem: Any, x: Any, rows: Any) -> Any:
     return at if of_type(problem, StrideProblem) else None
 
 
-TARGET_ONLY = Search(rounds=20, close=1e-9, grid=0, save=1e-15, patience=5)
+# Where the target is not reached, steps shrink by a constant factor: what the last one leaves is as
+# long as the step. At 1e-9 a return map is too rough for Newton's method to find its fixed point.
+TARGET_ONLY = Search(rounds=20, close=1e-11, grid=0, save=1e-15, patience=5)
 """The target, to rounding, whatever the controls are before."""
 
 
