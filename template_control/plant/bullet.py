@@ -99,7 +99,6 @@ class BulletPlant(EnginePlant):
     def __init__(self, robot: Biped, options: PlantOptions) -> None:
         super().__init__(robot)
         self.robot, self.options = robot, options
-        self._floats = robot.base_dof == FLOATING_DOF
         if self._floats:
             ready(READ)
         self._world: Any = _World()

@@ -59,8 +59,6 @@ class IdealPlant(OptionsPlant):
     Attributes:
         contacts: indices of the feet on the ground.
         impacts: impulses (n, 2) [N s] on the feet at each touchdown so far.
-        pulls: touchdowns and stances that could stick only by pulling at the ground; a real
-            foot would have slid or bounced.
     """
 
     @checked
@@ -74,7 +72,6 @@ class IdealPlant(OptionsPlant):
         self.robot = PlanarBiped(robot.path, robot.urdf, model, *same, groups=robot.groups)
         self.contacts: tuple[int, ...] = ()
         self.impacts: list[Array] = []
-        self.pulls = 0
         self._q, self._v = np.zeros(robot.nv), np.zeros(robot.nv)
         self._seen = np.empty(0), np.empty(0)
         self._drive = np.zeros(robot.nv)
@@ -208,7 +205,6 @@ class IdealPlant(OptionsPlant):
         self.contacts, a, f, clean = pressing(
             r.mass_matrix, right, *self._feet.rows(), self.contacts
         )
-        self.pulls += not clean
         end = self._flow(h, (a, f))
         if clean and self._margin(end) < 0.0:
             low, high = 0.0, h
@@ -245,8 +241,7 @@ class IdealPlant(OptionsPlant):
         touching = tuple(sorted((*self.contacts, *landing)))
         momentum, zero = r.mass_matrix @ self._v, self._nothing
         rows, _ = self._feet.rows()
-        held, v, impulse, clean = pressing(r.mass_matrix, momentum, rows, zero, touching)
-        self.pulls += not clean
+        held, v, impulse, _ = pressing(r.mass_matrix, momentum, rows, zero, touching)
         if all(rows[i, 1] @ v < _REST for i in touching):
             held = touching
             v, impulse = solve(r.mass_matrix, momentum, rows, zero, held)

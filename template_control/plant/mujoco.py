@@ -18,7 +18,6 @@ from template_control.plant.mjcf import FOOT, TRUNK, mjcf
 from template_control.plant.terrain import pieces
 from template_control.plant.world import EnginePlant
 from template_control.robot.biped import Biped
-from template_control.robot.terms import UP
 
 # Where MuJoCo has the place of a floating base, whose quaternion begins with w, and its velocity.
 _PLACE, _SPEED = [0, 1, 2, 4, 5, 6, 3], [0, 1, 2, 3, 4, 5]
@@ -87,7 +86,6 @@ class MujocoPlant(EnginePlant):
             raise RobotError(f"MuJoCo does not take {robot.path} ({error}): change it") from None
         self.data = engine.MjData(self.model)
         # Joints of one number each: all of a planar robot's, but not a floating base.
-        self._floats = robot.directions > UP
         joints = [self.model.joint(n) for n in list(robot.model.names)[2 if self._floats else 1 :]]
         place, speed = (_PLACE, _SPEED) if self._floats else ([], [])
         self._q = np.array([*place, *(joint.qposadr[0] for joint in joints)])

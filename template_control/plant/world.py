@@ -91,7 +91,8 @@ class EnginePlant(OptionsPlant, ABC):
 
     def __init__(self, robot: Biped) -> None:
         self._forces = np.zeros((len(robot.feet), robot.contact_rows))
-        self._axes = (0, 1, 2) if robot.directions > UP else (0, UP)  # of a contact's force
+        self._floats = robot.directions > UP  # the base
+        self._axes = (0, 1, 2) if self._floats else (0, UP)  # of a contact's force
         self._trunk_lies, self._stale = False, True
 
     @abstractmethod
