@@ -334,20 +334,24 @@ class StrideSupervisor:
             first = self._rollout.simulator.run(node.name, state, u, sensed.toes)
         return self._take(node, first, state, sensed, now)
 
-    def catch(
-        self, node: Node, step: CatchingStep, sensed: TemplateState, now: float
+    def step(
+        self, node: Node, catching: CatchingStep | None, sensed: TemplateState, now: float
     ) -> Node | None:
-        """Make a step that catches the robot, if a planner makes it; the node that it begins in."""
+        """Make a step to a stand, if a planner makes it; the node that it begins in.
+
+        ``catching`` is one that catches the robot; None: the planner's own, forward.
+        """
         kind, begins = self.goal.stride, node.name
         if len(node.stance) > 1:
-            kind = StrideKind.STEP_FORWARD if step.foot == sensed.feet[0] else StrideKind.STEP_BACK
+            ahead = catching is None or catching.foot == sensed.feet[0]
+            kind = StrideKind.STEP_FORWARD if ahead else StrideKind.STEP_BACK
             begins = self.automaton.starts[kind]
         planner = self.planners.get(kind)
         if kind not in STEPS or not isinstance(planner, CurvePlanner):
             return None
         start = np.column_stack((sensed.state[:2], sensed.state[2:4], sensed.acceleration))
         toes = float(sensed.toes[0]), float(sensed.toes[1])
-        self.decision, first = planner.curve(begins, start, toes, settled(planner.gait), step)
+        self.decision, first = planner.curve(begins, start, toes, settled(planner.gait), catching)
         self.goal = replace(self.goal, stride=kind, target=planner.gait.state)
         self.without_touchdown = False
         return self._take(self.automaton.node(first.start), first, sensed.state, sensed, now)

@@ -138,6 +138,49 @@ def test_g1_stops_from_a_walk_to_the_left():
     assert np.hypot(*middle[:2]) < 5e-3
 
 
+@pytest.mark.slow(seconds=8)
+@pytest.mark.parametrize(("speed", "stop"), [(0.4, 5.0), (0.45, 4.6)])
+def test_g1_closes_wide_feet_before_it_starts(speed, stop):
+    """A start from where a stop from a walk to the left leaves them ended in a fall."""
+    rows = ((0.0, speed, 0.1, 0.0), (stop, 0.0, 0.0, 0.0), (stop + 4.5, 0.7, 0.0, 0.0))
+    motion = VelocityProfile(rows, stop + 9.0, foreseen=False, gaits=("stand", "walk"))
+    spec = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(tc.Experiment(spec, motion=motion))
+    assert record.fall_reason == ""
+    kinds = list(record.kinds_of_stride)
+    step = kinds.index("sf")
+    assert kinds[step : step + 4] == ["sf", "sw", "wp", "wp"]
+    apart = []
+    for time in record.section_time[step : step + 2]:
+        row = np.searchsorted(record.time, time)
+        away = np.diff(record.space_foot[row, :, :2], axis=0)[0]
+        c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
+        apart.append(abs(c * away[1] - s * away[0]))
+    assert apart[0] > 0.22
+    assert apart[1] < 0.21
+
+
+@pytest.mark.slow(seconds=6)
+def test_g1_starts_with_room_to_both_sides():
+    """As it lifts the rear foot, the capture point is well on the inner side of the other one."""
+    rows = ((0.0, 0.5, 0.0, 0.0), (4.3, 0.0, 0.0, 0.0), (10.3, 0.7, 0.0, 0.0))
+    motion = VelocityProfile(rows, 12.0, foreseen=False, gaits=("stand", "walk"))
+    spec = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(tc.Experiment(spec, motion=motion))
+    assert record.fall_reason == ""
+    started = record.section_time[list(record.kinds_of_stride).index("sw")]
+    load = record.space_force[:, :, 2]
+    row = np.flatnonzero((record.time > started + 0.3) & (load.min(axis=1) < 1.0))[0]
+    assert record.time[row] < started + 1.1
+    c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
+    speed = np.gradient(record.space_com[:, :2], record.time, axis=0)[row]
+    point = record.space_com[row, :2] + speed * np.sqrt(record.space_com[row, 2] / 9.81)
+    stands, lifts = record.space_foot[row, np.argsort(-load[row]), :2]
+    left = np.array([-s, c])
+    inwards = np.sign(left @ (lifts - stands)) * (left @ (point - stands))
+    assert inwards > 0.025
+
+
 @pytest.mark.slow(seconds=3)
 def test_g1_runs():
     """With flight, at its speed, and with its motors hardly ever at their limits."""

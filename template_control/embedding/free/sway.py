@@ -368,7 +368,8 @@ def _planned(t: Any, r: Any, curve: PlainCurve) -> float:
             apart = (now if stage == 0 else other) - here
             pieces.low[at] = here + min(least * apart, load * apart) - half
             pieces.high[at] = here + max(least * apart, load * apart) + half
-            pieces.wish[at] = middle if stage == 2 else here
+            # In the middle there is room to both sides for what is not foreseen.
+            pieces.wish[at] = 0.5 * (pieces.low[at] + pieces.high[at])
             at += 1
     start, end = np.array((r.com[_SIDE], side_speed(t, r))), np.array((middle, 0.0))
     if not rests:
