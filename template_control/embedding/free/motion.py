@@ -65,8 +65,8 @@ WIDEST_START = 0.32
 """Lateral distance of two soles from which on a step closes them before a walk starts, over l0.
 
 The centre of pressure goes forward and to the side by the same shares of the load. From wide feet
-the CoM is not at rest to the side when the walk begins: of G1's starts from up to 0.28 l0 none of
-24 fell, from 0.35 l0 and more 4 of 6.
+the CoM is not at rest to the side when the walk begins: of G1's starts from up to 0.27 l0 none of
+32 fell, from 0.35 l0 and more 4 of 6.
 """
 TURNED_ROUND = 1.0
 """Angle between the course and a new one from which on the robot stops in between [rad]."""
