@@ -250,7 +250,7 @@ class LateralMotion:
         gait = supervisor.planner.gait
         planner.data["section_began"] = now
         if not _steps(gait):
-            node = self._close_feet(node, now)
+            node = self._close_feet(section, node, now)
             self._stand(section)
             return node
         scale, turning = self._scale, TURN_RAMP if node.stance else RUN_RAMP
@@ -299,12 +299,12 @@ class LateralMotion:
         turns = min(max(course.away(self.robot) / constant, -fastest), fastest)
         return np.array([course.left, course.turning, turns])
 
-    def _close_feet(self, node: Node, now: float) -> Node:
+    def _close_feet(self, section: Section, node: Node, now: float) -> Node:
         """Step before a walk starts, where soles are too far apart; the node of the step."""
         supervisor, (left, right) = self._supervisor, self.robot.space.foot_position[:, _SIDE]
         widest = WIDEST_START * supervisor.parameters.rest_length
-        starts = self.robot.patches and supervisor.goal.stride == StrideKind.STAND_TO_WALK
-        if not starts or abs(left - right) <= widest:
+        starts = section is REST and supervisor.planner.next_gait() is not None
+        if not (starts and self.robot.patches and abs(left - right) > widest):
             return node
         return supervisor.step(node, None, self._sensed, now) or node
 
