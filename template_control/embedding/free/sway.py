@@ -328,7 +328,8 @@ def _planned(t: Any, r: Any, curve: PlainCurve) -> float:
 
     Both feet stand until a liftoff, if there is one; then one does, until the touchdown or the
     section; then both. At VLO the CoM is to move as in the gait's periodic motion, at rest it is
-    to be in the middle of the feet.
+    to be in the middle of the feet. In the middle of its bounds the pressure has room to both sides
+    for what is not foreseen.
     """
     mode, path, lateral = t.mode, t.path, t.lateral
     due = np.minimum(np.maximum(path.event_times - path.time, 0.0), _FAR * lateral.unit)
@@ -338,7 +339,7 @@ def _planned(t: Any, r: Any, curve: PlainCurve) -> float:
         stays = t.feet.roles[_FRONT]
     here, half = r.foot_position[stays, _SIDE], SOLE_SHARE * lateral.half_width
     now = other = r.foot_position[1 - stays, _SIDE]
-    rests = due[_REST] <= due[_VLO]
+    rests, soles = due[_REST] <= due[_VLO], _on_soles(t, r)
     lasts = np.zeros(_STAGES)
     if mode.stances == 1 or lifts < ends:
         lasts[0] = lifts if mode.stances > 1 else 0.0
@@ -368,8 +369,10 @@ def _planned(t: Any, r: Any, curve: PlainCurve) -> float:
             apart = (now if stage == 0 else other) - here
             pieces.low[at] = here + min(least * apart, load * apart) - half
             pieces.high[at] = here + max(least * apart, load * apart) + half
-            # In the middle there is room to both sides for what is not foreseen.
             pieces.wish[at] = 0.5 * (pieces.low[at] + pieces.high[at])
+            if stage == 0 and not soles:
+                # Go2 started into a fall in 2 of 32 random commands with the middle, in none so.
+                pieces.wish[at] = here
             at += 1
     start, end = np.array((r.com[_SIDE], side_speed(t, r))), np.array((middle, 0.0))
     if not rests:
