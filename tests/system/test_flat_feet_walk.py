@@ -21,6 +21,13 @@ def walk(robot, steps, upper_body=False, **given):
     return tc.simulate(tc.Experiment(spec, motion=GaitSpec(speed=0.6), steps=steps, **given))
 
 
+def lateral_distance(record, row):
+    """Distance of the feet to the side [m]."""
+    away = np.diff(record.space_foot[row, :, :2], axis=0)[0]
+    c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
+    return abs(c * away[1] - s * away[0])
+
+
 def check(record, steps):
     """The walk has its speed; the trunk is upright, and the pressure stays within the soles."""
     assert (record.fall_reason, record.steps) == ("", steps)
@@ -130,10 +137,8 @@ def test_g1_stops_from_a_walk_to_the_left():
     assert record.solved.all()
     kinds = record.kinds_of_stride
     assert kinds[kinds.index("ws") + 1 :] == ["s"] * (len(kinds) - kinds.index("ws") - 1)
-    away = np.diff(record.space_foot[-1, :, :2], axis=0)[0]
-    c, s = np.cos(record.heading[-1]), np.sin(record.heading[-1])
     # As the gait's, 0.14 m, and as much further as a step goes to the left.
-    assert 0.05 < abs(c * away[1] - s * away[0]) < 0.25
+    assert 0.05 < lateral_distance(record, -1) < 0.25
     middle = record.space_foot[-1].mean(axis=0) - record.space_com[-1]
     assert np.hypot(*middle[:2]) < 5e-3
 
@@ -150,14 +155,9 @@ def test_g1_closes_wide_feet_before_it_starts(speed, stop):
     kinds = list(record.kinds_of_stride)
     step = kinds.index("sf")
     assert kinds[step : step + 4] == ["sf", "sw", "wp", "wp"]
-    apart = []
-    for time in record.section_time[step : step + 2]:
-        row = np.searchsorted(record.time, time)
-        away = np.diff(record.space_foot[row, :, :2], axis=0)[0]
-        c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
-        apart.append(abs(c * away[1] - s * away[0]))
-    assert apart[0] > 0.22
-    assert apart[1] < 0.21
+    before, after = np.searchsorted(record.time, record.section_time[step : step + 2])
+    assert lateral_distance(record, before) > 0.22
+    assert lateral_distance(record, after) < 0.21
 
 
 @pytest.mark.slow(seconds=6)
