@@ -23,7 +23,7 @@ from template_control.storage import to_jsonable
 from template_control.sweep.file import Outcome
 
 _REFRESH = 0.2  # [s] between two looks of the progress bar
-_GRACE = 0.5  # [s] in which calls may end that Ctrl-C found running
+_GRACE = 0.5  # [s] in which calls and threads may end that Ctrl-C found running
 
 
 class ExecutorLostError(Exception):
@@ -151,7 +151,7 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
     They leave Ctrl-C to this process, and end with it however it ends. An error in the block,
     Ctrl-C for one, kills them whatever they are doing.
     """
-    others = set(multiprocessing.active_children())
+    others, threads = set(multiprocessing.active_children()), set(threading.enumerate())
     pool = _Workers(count, initializer=_begin_worker)
     try:
         yield pool
@@ -159,9 +159,12 @@ def workers(count: int | None = None) -> Iterator[ProcessPoolExecutor]:
         pool.shutdown(wait=False, cancel_futures=True)
         for process in set(multiprocessing.active_children()) - others:
             process.kill()
+        # The pool's thread closes a pipe last. Python's exit, in that moment, writes to it.
+        for thread in set(threading.enumerate()) - threads:
+            if not thread.daemon:
+                thread.join(_GRACE)
         raise
-    finally:
-        pool.shutdown(cancel_futures=True)
+    pool.shutdown(cancel_futures=True)
 
 
 def _begin_worker() -> None:

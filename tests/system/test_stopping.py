@@ -99,7 +99,7 @@ def test_ctrl_c_while_figures_are_drawn_keeps_the_run_and_its_table(tmp_path, ca
 
 
 def test_an_error_kills_workers_whatever_they_do():
-    pids = []
+    pids, before = [], set(threading.enumerate())
 
     def work():
         with workers(2) as pool:
@@ -110,6 +110,8 @@ def test_an_error_kills_workers_whatever_they_do():
 
     with pytest.raises(KeyboardInterrupt):
         work()
+    # A thread of the pool that still ends as Python exits leaves a traceback.
+    assert all(thread.daemon for thread in set(threading.enumerate()) - before)
     wait_until(lambda: not any(map(alive, pids)), allowed())
 
 
