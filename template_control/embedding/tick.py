@@ -285,7 +285,7 @@ def _swing_sideways(t: Any, r: Any, want: Any, plan: tuple[Any, ...], dt: float)
     feet = np.array((stood[lateral.feet[0]], stood[lateral.feet[1]]))
     foothold = lateral_foothold(lateral, plan, path.time, com, feet)
     rests = path.event_times[_REST] < path.event_times[_VLO]
-    if lateral.step != 0.0 and mode.stances == 1 and (rests or np.isnan(foothold)):
+    if mode.stances == 1 and (rests or np.isnan(foothold)):
         # The next touchdown leads to a stand, on no spring of the template, or nowhere.
         lasts = path.event_times[_TOUCHDOWN] - path.time
         foothold = closing_foothold(t, r, f.roles[_REAR], lasts)
