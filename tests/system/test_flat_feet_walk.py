@@ -143,6 +143,28 @@ def test_g1_stops_from_a_walk_to_the_left():
     assert np.hypot(*middle[:2]) < 5e-3
 
 
+@pytest.mark.slow(seconds=11)
+@pytest.mark.parametrize(
+    ("velocity", "stop"), [((0.51, 0.08, -0.18), 5.61), ((0.32, 0.05, -0.16), 5.99)]
+)
+def test_the_last_foot_of_a_stop_lands_where_the_capture_point_is_between_both(velocity, stop):
+    """Not where the walk's next step had it: as far to the side as ahead, in shares of the step."""
+    rows = ((0.0, *velocity), (stop, 0.0, 0.0, 0.0))
+    motion = VelocityProfile(rows, stop + 1.0, foreseen=False, gaits=("stand", "walk"))
+    spec = tc.robot.RobotSpec("g1", free=True)
+    record = tc.simulate(tc.Experiment(spec, motion=motion))
+    stops = record.section_time[list(record.kinds_of_stride).index("ws")]
+    load = record.space_force[:, :, 2]
+    row = np.flatnonzero((record.time > stops) & (load.min(axis=1) > 0.0))[0] - 1
+    c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
+    speed = np.gradient(record.space_com[:, :2], record.time, axis=0)[row]
+    point = record.space_com[row, :2] + speed * np.sqrt(record.space_com[row, 2] / 9.81)
+    lands, stands = record.space_foot[row, np.argsort(load[row]), :2]
+    turned = np.array([[c, s], [-s, c]])
+    ahead, sideways = (turned @ (point - stands)) / (turned @ (lands - stands))
+    assert sideways == pytest.approx(ahead, abs=0.12)
+
+
 @pytest.mark.slow(seconds=8)
 @pytest.mark.parametrize(("speed", "stop"), [(0.4, 5.0), (0.45, 4.6)])
 def test_g1_closes_wide_feet_before_it_starts(speed, stop):
