@@ -28,6 +28,12 @@ def lateral_distance(record, row):
     return abs(c * away[1] - s * away[0])
 
 
+def capture_point(record, row):
+    """(2,) x and y of the capture point [m]."""
+    speed = np.gradient(record.space_com[:, :2], record.time, axis=0)[row]
+    return record.space_com[row, :2] + speed * np.sqrt(record.space_com[row, 2] / 9.81)
+
+
 def check(record, steps):
     """The walk has its speed; the trunk is upright, and the pressure stays within the soles."""
     assert (record.fall_reason, record.steps) == ("", steps)
@@ -157,11 +163,9 @@ def test_the_last_foot_of_a_stop_lands_where_the_capture_point_is_between_both(v
     load = record.space_force[:, :, 2]
     row = np.flatnonzero((record.time > stops) & (load.min(axis=1) > 0.0))[0] - 1
     c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
-    speed = np.gradient(record.space_com[:, :2], record.time, axis=0)[row]
-    point = record.space_com[row, :2] + speed * np.sqrt(record.space_com[row, 2] / 9.81)
     lands, stands = record.space_foot[row, np.argsort(load[row]), :2]
     turned = np.array([[c, s], [-s, c]])
-    ahead, sideways = (turned @ (point - stands)) / (turned @ (lands - stands))
+    ahead, sideways = (turned @ (capture_point(record, row) - stands)) / (turned @ (lands - stands))
     assert sideways == pytest.approx(ahead, abs=0.12)
 
 
@@ -195,11 +199,9 @@ def test_g1_starts_with_room_to_both_sides():
     row = np.flatnonzero((record.time > started + 0.3) & (load.min(axis=1) < 1.0))[0]
     assert record.time[row] < started + 1.1
     c, s = np.cos(record.heading[row]), np.sin(record.heading[row])
-    speed = np.gradient(record.space_com[:, :2], record.time, axis=0)[row]
-    point = record.space_com[row, :2] + speed * np.sqrt(record.space_com[row, 2] / 9.81)
     stands, lifts = record.space_foot[row, np.argsort(-load[row]), :2]
     left = np.array([-s, c])
-    inwards = np.sign(left @ (lifts - stands)) * (left @ (point - stands))
+    inwards = np.sign(left @ (lifts - stands)) * (left @ (capture_point(record, row) - stands))
     assert inwards > 0.025
 
 

@@ -323,7 +323,7 @@ class LateralMotion:
         planner.walk(gait)
         self._turn_trunk(1.0, 0.0)
         planner.aim(self._side(self._feet.landed))
-        planner.data["placed"] = 0  # of the next step of the walk that ends
+        planner.data["placed"] = 0  # the foothold so far is one of a walk that goes on
         planner.due = self._supervisor.time_of(Event.TOUCHDOWN)
 
     def _turn_trunk(self, duration: float, time: float, speed: float = 0.0) -> None:
