@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from importlib.resources import files
+from itertools import pairwise
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -168,6 +170,12 @@ class SpeedFamily:
         between = [0.5 * (a + b) for a, b in zip(ends[:-1], starts[1:], strict=True)]
         return np.array([starts[0], *between, ends[-1]])
 
+    def vlo_limits(self, parameters: SlipParameters) -> tuple[float, ...]:
+        """(chains + 1,) dx/dt at VLO at which the chains of a template begin and end [m/s]."""
+        ends = [chain.gaits(parameters).speeds for chain in self.chains]
+        between = (0.5 * (a[1] + b[0]) for a, b in pairwise(ends))
+        return ends[0][0], *between, ends[-1][1]
+
     def range(self, parameters: SlipParameters) -> tuple[float, float]:
         """Slowest and fastest mean speed of a template [m/s], to a centimetre per second."""
         low, high = 100.0 * parameters.speed_unit * self.limits[[0, -1]]
@@ -220,8 +228,8 @@ def walking_by_speed() -> SpeedFamily:
 
 def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
     """Slowest and fastest dx/dt at VLO of the library's family [m/s]."""
-    slow, *_, fast = (chain.gaits(parameters).speeds for chain in walking_by_speed().chains)
-    return slow[0], fast[-1]
+    slowest, *_, fastest = walking_by_speed().vlo_limits(parameters)
+    return slowest, fastest
 
 
 _SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
@@ -260,8 +268,14 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
 
 
 def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
-    """The gaits of the family by speed, with push-off; slower walks pass over a stiff leg."""
-    return walking_by_speed().chains[-1].gaits(parameters)
+    """The gaits of the library's family by their speed at VLO, with push-off."""
+    family = walking_by_speed()
+    _, *between, _ = family.vlo_limits(parameters)
+
+    def gait(speed: float) -> WalkingGait:
+        return family.chains[bisect_left(between, speed)].gait(parameters, speed)
+
+    return GaitsBySpeed(gait, family_speeds(parameters))
 
 
 def paper_walks(parameters: SlipParameters) -> GaitsBySpeed:

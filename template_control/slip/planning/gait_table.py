@@ -91,9 +91,8 @@ def gait_table(parameters: SlipParameters) -> GaitTable:
     unit = parameters.speed_unit
     parts = [_rows(chain, parameters) for chain in family.chains]
     speeds = [chain.vlo_speed * unit for chain in family.chains]
-    for i in range(len(parts) - 1):
-        # Chains overlap; each serves up to the middle.
-        middle = 0.5 * (speeds[i][-1] + speeds[i + 1][0])
+    _, *between, _ = family.vlo_limits(parameters)
+    for i, middle in enumerate(between):
         ends = [row_at(GaitTable(speeds[j], parts[j]), middle) for j in (i, i + 1)]
         before, after = speeds[i] < middle, speeds[i + 1] > middle
         parts[i] = np.vstack((parts[i][before], ends[0]))
