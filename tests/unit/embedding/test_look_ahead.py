@@ -14,6 +14,8 @@ from template_control.embedding.planners.ahead import (
     AheadPlanner,
 )
 from template_control.embedding.planners.planner import Cause, Context
+from template_control.embedding.standing.curves import StandingOptions
+from template_control.embedding.standing.passes import PassTable
 from template_control.errors import ScenarioError
 from template_control.robot.template import walk_limits
 from template_control.run.robot_route import check_feasibility
@@ -24,7 +26,7 @@ from template_control.slip.control.least_squares import Search
 from template_control.slip.control.touchdown import ANY_ANGLE, TOP_MARGIN
 from template_control.slip.dynamics.model import stride_kernel
 from template_control.slip.dynamics.stride import StrideSimulator
-from template_control.slip.gaits.walking_by_speed import walking_by_speed
+from template_control.slip.gaits.walking_by_speed import gaits_by_speed, walking_by_speed
 from template_control.slip.maps.return_map import ReturnMap
 from template_control.slip.maps.section import VLO
 from template_control.slip.planning.gait_table import (
@@ -189,6 +191,15 @@ def test_a_gait_is_kept(planner, speed):
     np.testing.assert_allclose(decision.predicted, z, atol=2e-3)
     k = row[STIFFNESS]
     np.testing.assert_allclose(decision.controls[SLOTS[1:]], k, rtol=0.02)
+
+
+@pytest.mark.parametrize("speed", [0.14, 0.2, 0.3, 0.3259, 0.337, 0.338, 0.36, 0.8, 1.3])
+def test_a_walk_goes_on_from_where_a_start_leads(planner, speed):
+    """The gait of a start is the planner's own at that speed, whichever chain it is of."""
+    over = PassTable(P, StandingOptions(), gaits_by_speed(P)).at(speed)
+    decision = planner.decide(Context(over.vlo, over.vlo))
+    assert decision.nominal
+    np.testing.assert_allclose(decision.predicted, over.vlo, atol=2e-3)
 
 
 @pytest.mark.parametrize("seed", range(5))
