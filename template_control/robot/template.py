@@ -26,8 +26,8 @@ from template_control.slip.gaits.gait import (
 )
 from template_control.slip.gaits.running_gait import running_gait, suited_height
 from template_control.slip.gaits.walking_by_speed import (
-    family_speeds,
     gait_for_speed,
+    gaits_by_speed,
     walking_by_speed,
 )
 from template_control.slip.maps.return_map import REAR_BOTTOM, ReturnMap
@@ -255,7 +255,7 @@ def walk_limits(robot: Biped) -> WalkLimits:
     try:
         speeds = walking_speeds(robot)
     except GaitError:
-        speeds = family_speeds(p)
+        speeds = gaits_by_speed(p).speeds
     slowest, fastest = (float(gait_for_speed(p, speed).vlo[0]) for speed in speeds)
     template_for(robot)  # straight legs
     joint = robot.hinges[0][0]

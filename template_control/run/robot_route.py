@@ -20,7 +20,7 @@ from template_control.slip.automaton.automaton import AUTOMATON
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.dynamics.stride import StrideSimulator
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
-from template_control.slip.gaits.walking_by_speed import family_speeds, speed_range
+from template_control.slip.gaits.walking_by_speed import gaits_by_speed, speed_range
 from template_control.slip.maps.section import VLO
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.planning.gait_table import STATE, gait_table, row_at
@@ -90,7 +90,7 @@ def robot_route(robot: Biped, scenario: Scenario, push_off: bool | None = None) 
     push_off = may if push_off is None else push_off
     if not push_off:
         _check_segments(robot, own)
-    slowest, fastest = (family_speeds if push_off else speed_range)(p)
+    slowest, fastest = gaits_by_speed(p).speeds if push_off else speed_range(p)
     moves = own.segments[0].gait in _RANGES
     if moves and not slowest <= own.start[0] <= fastest:
         raise ScenarioError(

@@ -26,7 +26,7 @@ from template_control.robot.template import (
 )
 from template_control.run.options import ForwardSpeed, HeadingCommand, SideSpeed, TurningRate
 from template_control.run.specs import SOLE_RUN
-from template_control.slip.gaits.walking_by_speed import family_speeds
+from template_control.slip.gaits.walking_by_speed import gaits_by_speed
 from template_control.slip.scenario.scenario import Gait
 from template_control.slip.scenario.speed_route import GaitChangeOptions, SpeedRoute
 from template_control.slip.similarity import Scale
@@ -191,7 +191,7 @@ class VelocityRange:
         try:
             low, high = walking_speeds(robot)
         except GaitError:
-            low, high = family_speeds(p)
+            low, high = gaits_by_speed(p).speeds
         low = max(low, _SLOWEST[robot_kind(robot)] * unit)
         if robot.patches:
             high = min(high, _FASTEST_ON_SOLES * unit)

@@ -226,12 +226,6 @@ def walking_by_speed() -> SpeedFamily:
     return SpeedFamily(tuple(Chain(**chain) for chain in chains))
 
 
-def family_speeds(parameters: SlipParameters) -> tuple[float, float]:
-    """Slowest and fastest dx/dt at VLO of the library's family [m/s]."""
-    slowest, *_, fastest = walking_by_speed().vlo_limits(parameters)
-    return slowest, fastest
-
-
 _SPEEDS = (0.195, 0.225, 0.29, 0.35, 0.395)  # at VLO, over sqrt(g l0)
 _ANGLES = (70.0, 69.5, 68.0, 66.0, 66.0)  # [deg]
 
@@ -270,12 +264,12 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
 def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
     """The gaits of the library's family by their speed at VLO, with push-off."""
     family = walking_by_speed()
-    _, *between, _ = family.vlo_limits(parameters)
+    slowest, *between, fastest = family.vlo_limits(parameters)
 
     def gait(speed: float) -> WalkingGait:
         return family.chains[bisect_left(between, speed)].gait(parameters, speed)
 
-    return GaitsBySpeed(gait, family_speeds(parameters))
+    return GaitsBySpeed(gait, (slowest, fastest))
 
 
 def paper_walks(parameters: SlipParameters) -> GaitsBySpeed:
