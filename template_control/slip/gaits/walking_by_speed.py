@@ -209,10 +209,6 @@ class SpeedFamily:
         speed, height = by_speed(np.clip(mean_speed / unit, known[0], known[-1])).tolist()
         return speed * unit, height * parameters.rest_length
 
-    def chain_of(self, gait: WalkingGait) -> Chain:
-        """The chain that a gait is on, by its mean speed."""
-        return self._chain(gait.parameters, gait.mean_speed)
-
     def _chain(self, parameters: SlipParameters, mean_speed: float) -> Chain:
         inner = self.limits[1:-1]
         return self.chains[int(np.searchsorted(inner, mean_speed / parameters.speed_unit))]
@@ -278,10 +274,9 @@ def paper_walks(parameters: SlipParameters) -> GaitsBySpeed:
 
 
 def other_walks(gait: WalkingGait) -> GaitsBySpeed:
-    """Walks that a gait may give way to: with push-off those of the family on its branch."""
-    if gait.stride == StrideKind.WALK:
-        return paper_walks(gait.parameters)
-    return walking_by_speed().chain_of(gait).gaits(gait.parameters)
+    """Walks that a gait may give way to: with push-off those of the library's family."""
+    family = paper_walks if gait.stride == StrideKind.WALK else gaits_by_speed
+    return family(gait.parameters)
 
 
 @checked

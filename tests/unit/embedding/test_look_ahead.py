@@ -436,8 +436,10 @@ def test_beyond_the_family_its_end_is_accepted(planner, wanted, end):
 
 
 @pytest.mark.slow(seconds=2)
-def test_a_plan_that_is_not_cheap_gives_way_to_a_search():
-    hasty = AheadPlanner(P, AheadOptions(cheap=1e-9))
+@pytest.mark.parametrize("first", [None, 0.15])
+def test_a_plan_that_is_not_cheap_gives_way_to_a_search(first):
+    """It leads to a gait near the present speed, however slow the first gait was."""
+    hasty = AheadPlanner(P, AheadOptions(cheap=1e-9), first)
     z = row_at(table(), 0.9)[STATE:CONTROL] + [0.1, 0.0, 0.0]
     decision = hasty.decide(Context(z, z))
     assert decision.feasible
