@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
 from importlib.resources import files
@@ -146,11 +147,6 @@ class Chain:
             found = min(ends.tolist(), key=lambda end: abs(surplus(end)))
         return self.gait(p, found * unit)
 
-    def gaits(self, parameters: SlipParameters) -> GaitsBySpeed:
-        """The chain's gaits of a template by their speed at VLO."""
-        slowest, fastest = (float(self.vlo_speed[i]) * parameters.speed_unit for i in (0, -1))
-        return GaitsBySpeed(partial(self.gait, parameters), (slowest, fastest))
-
 
 @dataclass(frozen=True)
 class SpeedFamily:
@@ -165,16 +161,11 @@ class SpeedFamily:
     @cached_property
     def limits(self) -> Array:
         """(chains + 1,) mean speeds over sqrt(g l0) at which the chains begin and end."""
-        starts = [chain.mean_speed[0] for chain in self.chains]
-        ends = [chain.mean_speed[-1] for chain in self.chains]
-        between = [0.5 * (a + b) for a, b in zip(ends[:-1], starts[1:], strict=True)]
-        return np.array([starts[0], *between, ends[-1]])
+        return _limits([chain.mean_speed for chain in self.chains])
 
-    def vlo_limits(self, parameters: SlipParameters) -> tuple[float, ...]:
+    def vlo_limits(self, parameters: SlipParameters) -> Array:
         """(chains + 1,) dx/dt at VLO at which the chains of a template begin and end [m/s]."""
-        ends = [chain.gaits(parameters).speeds for chain in self.chains]
-        between = (0.5 * (a[1] + b[0]) for a, b in pairwise(ends))
-        return ends[0][0], *between, ends[-1][1]
+        return _limits([chain.vlo_speed * parameters.speed_unit for chain in self.chains])
 
     def range(self, parameters: SlipParameters) -> tuple[float, float]:
         """Slowest and fastest mean speed of a template [m/s], to a centimetre per second."""
@@ -212,6 +203,12 @@ class SpeedFamily:
     def _chain(self, parameters: SlipParameters, mean_speed: float) -> Chain:
         inner = self.limits[1:-1]
         return self.chains[int(np.searchsorted(inner, mean_speed / parameters.speed_unit))]
+
+
+def _limits(lines: Sequence[Array]) -> Array:
+    """(n + 1,) ends of n rising lines; where two overlap, the middle of what both have."""
+    middles = [0.5 * (a[-1] + b[0]) for a, b in pairwise(lines)]
+    return np.array([lines[0][0], *middles, lines[-1][-1]])
 
 
 @cache
@@ -260,7 +257,7 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
 def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
     """The gaits of the library's family by their speed at VLO, with push-off."""
     family = walking_by_speed()
-    slowest, *between, fastest = family.vlo_limits(parameters)
+    slowest, *between, fastest = family.vlo_limits(parameters).tolist()
 
     def gait(speed: float) -> WalkingGait:
         return family.chains[bisect_left(between, speed)].gait(parameters, speed)

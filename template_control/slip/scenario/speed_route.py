@@ -15,7 +15,7 @@ from template_control.checks.ranges import NotNegative, Positive
 from template_control.errors import ScenarioError
 from template_control.slip.automaton.vocabulary import StrideKind
 from template_control.slip.gaits.running_gait import running_speeds, suited_height
-from template_control.slip.gaits.walking_by_speed import walking_by_speed
+from template_control.slip.gaits.walking_by_speed import gaits_by_speed, walking_by_speed
 from template_control.slip.maps.section import APEX, REST, VLO, Section
 from template_control.slip.parameters import SlipParameters
 from template_control.slip.scenario.route import SpeedAtTime, StrideGoal
@@ -121,11 +121,11 @@ class SpeedRoute:
         gait = self._gait(first, _Way(0.0, 0.0))
         self.section: Section = REST if gait == STAND else VLO
         if gait == "run":
-            walk = self._family.chains[-1].gait(parameters, self._take_off)
+            walk = gaits_by_speed(parameters).gait(self._take_off)
         else:
             walk = self._family.gait_for(parameters, min(max(first, low), high))
-        self.start: Array = self._rest if gait == STAND else walk.vlo
-        self.walking_speed = float(walk.vlo[0])
+        self.start: Array = self._rest if gait == STAND else walk.state
+        self.walking_speed = float(walk.state[0])
         self._guess = _FIRST_DURATION * float(np.sqrt(parameters.rest_length / parameters.gravity))
         self.reset()
 
