@@ -371,7 +371,7 @@ def _planned(t: Any, r: Any, curve: PlainCurve) -> float:
             pieces.high[at] = here + max(least * apart, load * apart) + half
             pieces.wish[at] = 0.5 * (pieces.low[at] + pieces.high[at])
             if stage == 0 and not soles:
-                # Go2 started into a fall in 2 of 32 random commands with the middle, in none so.
+                # With the middle Go2 fell in 2 of 32 random commands, as it started; so in one.
                 pieces.wish[at] = here
             at += 1
     start, end = np.array((r.com[_SIDE], side_speed(t, r))), np.array((middle, 0.0))
