@@ -46,12 +46,14 @@ def test_a_floating_base_walks_runs_and_walks_again():
     assert np.hypot(*way) / np.ptp(record.time[last]) == pytest.approx(0.6, rel=0.1)
 
 
-@pytest.mark.slow(seconds=6)
-def test_go2_stands_trots_and_stands_again():
-    rows = ((0.0, 0.0), (1.0, 0.5), (2.5, 1.0), (6.5, 0.0))
+@pytest.mark.slow(seconds=7)
+@pytest.mark.parametrize("stops", [6.5, 6.8])
+def test_go2_stands_trots_and_stands_again(stops):
+    """It comes to a stand in 4.4 to 5.7 s: how many steps it takes depends on the stop's moment."""
+    rows = ((0.0, 0.0), (1.0, 0.5), (2.5, 1.0), (stops, 0.0))
     motion = VelocityProfile(
         tuple((time, speed, 0.0, 0.0) for time, speed in rows),
-        duration=11.5,
+        duration=stops + 6.0,
         gaits=("stand", "walk", "run"),
     )
     record = tc.simulate(tc.Experiment(tc.load_floating_robot("go2"), motion))
