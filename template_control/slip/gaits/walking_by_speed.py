@@ -255,7 +255,13 @@ def walking_gait(parameters: SlipParameters, vlo_speed: float) -> WalkingGait:
 
 
 def gaits_by_speed(parameters: SlipParameters) -> GaitsBySpeed:
-    """The gaits of the library's family by their speed at VLO, with push-off."""
+    """The gaits of the library's family by their speed at VLO, with push-off.
+
+    Where two chains have a gait of a speed, it is the slower chain's up to the middle.
+
+    Args:
+        parameters: the template; its stiffness k0 counts for nothing, each gait has its own.
+    """
     family = walking_by_speed()
     slowest, *between, fastest = family.vlo_limits(parameters).tolist()
 
